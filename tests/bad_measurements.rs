@@ -490,13 +490,19 @@ fn a_gear_that_the_data_are_not_of_is_refused_or_named_as_its_ratio() {
         other_wheel.stderr
     );
     assert!(!desk.path("out").exists());
-    // A neighbour in the catalogue is not far enough off to be no drive of this kind: its ratio is what is wrong.
-    measured(100.0).done();
+    // A neighbour in the catalogue is a drive of this kind: the run ends with both ratios all the same.
+    let neighbour = measured(100.0);
+    let named =
+        neighbour.stderr.contains("error: data.csv: ratio: found 95") && neighbour.stderr.contains("allowed: 100");
+    assert!(neighbour.code == 2 && named, "{} {}", neighbour.code, neighbour.stderr);
+    assert!(!desk.path("out").exists());
+    // An error of the ratio that no other whole one explains is a cause.
+    measured(95.2).done();
     let json: Value = serde_json::from_str(&desk.read("out/diagnosis.json")).unwrap();
     let causes: Vec<&Value> = json["causes"].as_array().unwrap().iter().map(|cause| &cause["name"]).collect();
     assert_eq!(causes, ["ratio_error"], "{json}");
     let error = json["causes"][0]["parameters"]["ratio_relative_error"]["value"].as_f64().unwrap();
-    assert!((error - (95.0 / 100.0 - 1.0)).abs() < 1e-4, "{error}");
+    assert!((error - (95.0 / 95.2 - 1.0)).abs() < 1e-4, "{error}");
 }
 
 /// Writes the healthy drive over and over, as one long record.

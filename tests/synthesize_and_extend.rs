@@ -21,6 +21,9 @@ const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 
                        1.5\n[[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad \
                        = 0.4\n";
 
+/// Files of a calibrated table.
+const CALIBRATED: [&str; 4] = ["calibrated.fxt", "calibrated.h", "calibrated.json", "calibrated.rs"];
+
 fn number(value: &Value, path: &[&str]) -> f64 {
     let found = path.iter().fold(value, |value, key| &value[*key]);
     found.as_f64().unwrap_or_else(|| panic!("{path:?} is {found}"))
@@ -151,7 +154,11 @@ fn where_nothing_is_hidden_nothing_is_extended() {
     println!("nothing hidden: no table {none:.2}\", nominal {nominal:.2}\", extended {extended:.2}\"");
     assert_eq!(nominal, extended);
     assert!(nominal < none);
-    assert_eq!(names(&desk.path("found")), ["diagnosis.json", "report.html"]);
+    // The unit is off its nominal model within the spread of units: the table takes that out, and nothing is extended.
+    assert_eq!(diagnosis["table"]["kind"], "calibrated", "{}", diagnosis["table"]);
+    assert!(number(&diagnosis, &["table", "rms_left_out_arcsec"]) < 0.7 * nominal, "{}", diagnosis["table"]);
+    let files = [&CALIBRATED[..], &["diagnosis.json", "report.html"]].concat();
+    assert_eq!(names(&desk.path("found")), files);
 }
 
 #[test]
@@ -190,6 +197,48 @@ fn an_error_of_the_output_encoder_is_not_put_into_tables() {
         assert!(left["reason"].as_str().unwrap().contains("not the joint"));
         assert!(!names(&desk.path("found")).iter().any(|file| file.ends_with(".fxt")));
     }
+}
+
+/// Known by its ratio alone: a table of the causes, or the calibrated one, leaves less of another log of the unit; and
+/// the model that the diagnosis writes is what a calibration, and the next diagnosis, begin with.
+#[test]
+fn a_drive_known_by_its_ratio_ends_in_a_table() {
+    let desk = Desk::new();
+    desk.write(
+        "nominal.toml",
+        "[drive]\nratio = 101.0\n[nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = \
+         0.0\nfriction_torque_n_m = 1.5\n",
+    );
+    let effect = "generator_encoder_eccentricity:amplitude_arcsec=30,phase_rad=0.7";
+    for seed in [3, 4] {
+        let line =
+            format!("synthesize --model nominal.toml --effect {effect} --no-spread --seed {seed} --out made{seed}");
+        desk.line(&line).done();
+    }
+    let diagnosis = desk.line("diagnose made3/data.csv --model nominal.toml --out found --json").done().json();
+    println!("{} {}", diagnosis["causes"], diagnosis["table"]);
+    let left_of = |table: &str| -> [f64; 2] {
+        let line = format!("replay --tables {table} made4/data.csv --out replayed --json");
+        let replayed = desk.line(&line).done().json();
+        ["rms_measured_arcsec", "rms_residual_arcsec"].map(|key| number(&replayed, &[key]))
+    };
+    let file = diagnosis["table"]["file"].as_str().unwrap();
+    let [measured, left] = left_of(&format!("found/{file}"));
+    let nominal = number(&diagnosis, &["compensation", "rms_nominal_tables_arcsec"]);
+    assert!(left < 0.3 * nominal && left < measured, "{measured}\", {nominal}\" by the nominal model, {left}\"");
+
+    let line = "calibrate made3/data.csv --model found/drive-extended.toml --out calibrated --json";
+    let calibrated = desk.line(line).done().json();
+    let held = |key: &str| number(&calibrated, &["held_out", key]);
+    assert!(held("rms_prior_arcsec") < 0.3 * nominal, "the causes are in what was known: {}", calibrated["held_out"]);
+    let [_, by_calibrated] = left_of("calibrated/calibrated.fxt");
+    assert!(by_calibrated < 1.1 * left, "{left}\", calibrated {by_calibrated}\"");
+
+    let line = "diagnose made3/data.csv --model found/drive-extended.toml --out again --json";
+    let again = desk.line(line).done().json();
+    let [first, second] = [&diagnosis, &again].map(|found| number(found, &["table", "rms_left_out_arcsec"]));
+    assert!(second < 1.1 * first, "{first}\", with the causes known before {second}\"");
+    assert_eq!(causes(&again), Vec::<&str>::new());
 }
 
 /// The drive of the FEM: made, diagnosed, written as a drive that the FEM runs, and its tables made again.

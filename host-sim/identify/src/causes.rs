@@ -107,31 +107,43 @@ impl Kin {
 }
 
 /// A condition that data have to meet before they say anything of a cause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum Need {
     /// The numbers of teeth.
+    #[serde(rename = "needs_teeth")]
     Teeth,
     /// Enough generator turns that a place comes again.
+    #[serde(rename = "needs_turns")]
     Turns,
     /// A load on the output, and its column.
+    #[serde(rename = "needs_torque")]
     Load,
     /// A spring in the nominal model.
+    #[serde(rename = "needs_stiffness")]
     Spring,
     /// The temperature.
+    #[serde(rename = "needs_temperature")]
     Temperature,
     /// Temperatures apart from each other, or from the nominal one.
+    #[serde(rename = "needs_temperatures")]
     TemperatureSpan,
     /// The time.
+    #[serde(rename = "needs_time")]
     Time,
     /// A generator that moves.
+    #[serde(rename = "needs_motion")]
     Motion,
     /// A speed or a load that changes fast enough to make a load swing, in rows that are read at one instant.
+    #[serde(rename = "needs_changes")]
     Swings,
     /// An output that turns through half a turn.
+    #[serde(rename = "needs_half_output_turn")]
     HalfOutputTurn,
     /// So much use that a drive may have worn meanwhile.
+    #[serde(rename = "needs_use")]
     Use,
     /// A lasting jump of the error by whole teeth.
+    #[serde(rename = "needs_jump")]
     Jump,
 }
 

@@ -40,19 +40,15 @@ pub fn parse_known(
     table: Option<&Table<'_>>,
 ) -> Result<Recording, MeasuredError> {
     let mut read = parse_at_least(FEW, file, bytes, columns, &nominal.gear())?;
-    let says_something = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
-    if !says_something || read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
+    if read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
         return Ok(read);
     }
     check_degrees(&read, columns, nominal, table)?;
-    let mut asked = read.clone();
+    let mut asked = read.with_sessions(read.sessions.clone());
     check_torque(&mut asked, nominal, table);
-    for fault in asked.faults.into_iter().skip(read.faults.len()) {
+    for fault in asked.faults {
         if fault.name == FaultName::TorqueSign {
-            read.sessions
-                .iter_mut()
-                .zip(&asked.sessions)
-                .for_each(|(to, from)| to.torque_n_m.clone_from(&from.torque_n_m));
+            read.sessions.clone_from(&asked.sessions);
             read.faults.push(fault);
         } else {
             read.notes.push(format!("`diagnose` doubts the torque, which stays here: {}", fault.what));

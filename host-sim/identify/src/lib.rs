@@ -12,6 +12,7 @@ pub mod diagnosis;
 pub mod extension;
 pub mod known_rows;
 mod least_squares;
+mod linear;
 pub mod look;
 pub mod measurement;
 pub mod nominal;

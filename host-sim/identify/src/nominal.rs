@@ -71,6 +71,25 @@ impl Teeth {
     }
 }
 
+/// A ratio that no table can be of.
+#[derive(Debug, thiserror::Error)]
+pub enum NoSuchWheels {
+    /// The core refuses the wheels.
+    #[error("ratio {ratio}: {why}")]
+    Core {
+        /// The ratio.
+        ratio: f64,
+        /// What the core says.
+        why: flexspline::DriveError,
+    },
+    /// No two wheels have it.
+    #[error(
+        "ratio: found {0}, allowed: a ratio that wheels with two teeth of difference have, a whole number or a half; \
+         or a model with the teeth, --model nominal.toml"
+    )]
+    Ratio(f64),
+}
+
 /// One harmonic of the nominal output error, `amplitude sin(order generator + phase)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
@@ -163,6 +182,19 @@ impl Nominal {
                 Teeth { flexspline: more, circular_spline: more + 2, fixed: Fixed::CircularSpline }
             }
         })
+    }
+
+    /// The drive as the core knows it.
+    ///
+    /// # Errors
+    /// No pair of wheels has this ratio.
+    pub(crate) fn core_drive(&self) -> Result<flexspline::Drive, NoSuchWheels> {
+        let ratio = self.ratio;
+        let drive = self.teeth_or_of_two_waves().core_drive().map_err(|why| NoSuchWheels::Core { ratio, why })?;
+        if (drive.exact_ratio() / ratio - 1.0).abs() > 1e-9 {
+            return Err(NoSuchWheels::Ratio(ratio));
+        }
+        Ok(drive)
     }
 
     /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature;

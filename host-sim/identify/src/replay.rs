@@ -5,12 +5,12 @@
 
 use std::path::Path;
 
-use flexspline::{GeneratorAngle, PlayState, Quality, Table};
+use flexspline::{GeneratorAngle, PlayState, Prediction, Quality, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::OtherRatio;
+use crate::calibrate::check_ratio_of;
 use crate::known_rows::{FEW, parse_known};
 use crate::measurement::{
     ColumnMap, Fault, FaultName, Gear, MeasuredError, Quantity, Recording, Treatment, parse_at_least,
@@ -226,9 +226,6 @@ pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result
     rows_of(recording, ratio, temperature_c).map(|read| read.rows)
 }
 
-/// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
-const MOST_ERROR_RAD: f64 = 0.0175;
-
 /// The rows of a recording, if a table can be played over them.
 fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<RowsRead, MeasuredError> {
     let refuse = |line: Option<u64>, what: String| MeasuredError { file: recording.file.clone(), line, what };
@@ -240,39 +237,41 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
     if let Some(fault) = recording.faults.iter().find(in_other_unit) {
         return Err(refuse(Some(fault.first_line), fault.what.clone()));
     }
-    let errors: Vec<f64> = recording.sessions.iter().flat_map(|session| session.error_rad.iter().copied()).collect();
-    if let Some(other) = OtherRatio::of(std::slice::from_ref(&recording), ratio) {
-        // A load that grows over a few rows looks the same.
-        if other.is_far() && about_mean(&errors) >= MOST_ERROR_RAD {
-            return Err(refuse(None, other.to_string()));
-        }
-        recording.notes.push(other.to_string());
-    }
+    let said = check_ratio_of(&recording, ratio).map_err(|other| refuse(None, other.to_string()))?;
+    recording.notes.extend(said);
     if recording.sessions.iter().all(|session| session.torque_n_m.is_none()) {
         recording.notes.push("no torque: the table is read at 0 N.m".to_owned());
     }
-    let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
     let rows = recording.sessions.iter().flat_map(|session| {
-        (0..session.len()).map(move |k| MeasuredRow {
-            generator_rad: session.generator_rad[k],
-            error_arcsec: session.error_rad[k] * ARCSEC_PER_RAD,
-            torque_n_m: at(&session.torque_n_m, k, 0.0),
-            temperature_c: at(&session.temperature_c, k, temperature_c),
+        let measured = session.states(temperature_c).zip(&session.error_rad);
+        measured.map(|([generator_rad, torque_n_m, temperature_c], error)| MeasuredRow {
+            generator_rad,
+            error_arcsec: error * ARCSEC_PER_RAD,
+            torque_n_m,
+            temperature_c,
         })
     });
     Ok(RowsRead { rows: rows.collect(), faults: recording.faults, notes: recording.notes })
 }
 
+/// The core over rows of generator angle (rad), torque (N·m) and temperature (°C), from a state it does not know.
+pub(crate) fn by_core(table: &Table<'_>, rows: impl Iterator<Item = [f64; 3]>) -> impl Iterator<Item = Prediction> {
+    let mut play = PlayState::unknown();
+    rows.map(move |[generator_rad, torque_n_m, temperature_c]| {
+        // The reader bounds the angle, far inside the range of the angle type.
+        let generator = GeneratorAngle::from_rad(generator_rad).unwrap_or(GeneratorAngle::ZERO);
+        table.forward(&mut play, generator, torque_n_m as f32, temperature_c as f32)
+    })
+}
+
 /// Runs the core over the rows, from a state it does not know.
 pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, ReplaySummary) {
-    let mut play = PlayState::unknown();
     let mut by_quality = [0; 4];
+    let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
     let replayed: Vec<ReplayedRow> = rows
         .iter()
-        .map(|row| {
-            // The reader bounds the angle, far inside the range of the angle type.
-            let generator = GeneratorAngle::from_rad(row.generator_rad).unwrap_or(GeneratorAngle::ZERO);
-            let said = table.forward(&mut play, generator, row.torque_n_m as f32, row.temperature_c as f32);
+        .zip(by_core(table, states))
+        .map(|(row, said)| {
             by_quality[said.quality as usize] += 1;
             let predicted_arcsec = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
             ReplayedRow {

@@ -4,10 +4,10 @@
 //! in another turn reads the same within its turn, and the table adds the error of another place: it may leave more
 //! than there was. The rows show it by the turn at which the table leaves least of them.
 
-use flexspline::{GeneratorAngle, PlayState, Table};
+use flexspline::{Prediction, Table};
 use serde::Serialize;
 
-use super::replay::MeasuredRow;
+use super::replay::{MeasuredRow, by_core};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Rows that a turn is looked for with, about.
@@ -57,14 +57,11 @@ fn some(rows: &[MeasuredRow]) -> Vec<&MeasuredRow> {
 
 /// What the table leaves of rows about their mean, arcsec rms, with the generator's zero and the torque's sign changed.
 fn left(table: &Table<'_>, rows: &[&MeasuredRow], off_rad: f64, sign: f64) -> f64 {
-    let mut play = PlayState::unknown();
-    let residual = |row: &&MeasuredRow| {
-        let generator = GeneratorAngle::from_rad(row.generator_rad - off_rad).unwrap_or(GeneratorAngle::ZERO);
-        let torque_n_m = (sign * row.torque_n_m) as f32;
-        let said = table.forward(&mut play, generator, torque_n_m, row.temperature_c as f32);
+    let states = rows.iter().map(|row| [row.generator_rad - off_rad, sign * row.torque_n_m, row.temperature_c]);
+    let residual = |(row, said): (&&MeasuredRow, Prediction)| {
         row.error_arcsec - f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD
     };
-    about_mean(&rows.iter().map(residual).collect::<Vec<_>>())
+    about_mean(&rows.iter().zip(by_core(table, states)).map(residual).collect::<Vec<_>>())
 }
 
 /// What the table leaves of the rows with the torque's sign turned, arcsec rms; `None` unless that is clearly less than
@@ -108,6 +105,7 @@ pub(super) fn about_mean(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flexspline::{GeneratorAngle, PlayState};
     use flexspline_design::tables::{SampleOptions, from_samples, samples};
     use flexspline_mechanics::drive::{Drive, GeneratorKind};
 

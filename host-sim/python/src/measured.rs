@@ -12,6 +12,7 @@ use flexspline_identify::diagnosis::{
 };
 use flexspline_identify::extension::Model;
 use flexspline_identify::measurement::{ColumnMap, Session, parse, read};
+use flexspline_mechanics::drive::Drive as MechanicsDrive;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -80,9 +81,14 @@ pub fn calibrate<'py>(
         } else {
             None
         };
+        let mut extended = None;
         let prior = match (&image, &known) {
             (Some(table), _) => Prior::of_table(table, kind),
-            (None, KnownFrom::Model(path)) => Prior::of_model(path, kind).map_err(PythonFailure::bad)?,
+            (None, KnownFrom::Model(path)) => {
+                let (prior, model) = Prior::of_file(path, kind).map_err(PythonFailure::bad)?;
+                extended = Some(Subject::of_model(model, MechanicsDrive::hhd_95(), kind));
+                prior
+            }
             (None, KnownFrom::Ratio(ratio)) => Prior::of_given_ratio(*ratio, kind).map_err(PythonFailure::bad)?,
             (None, KnownFrom::Image(_)) => return Err(PythonFailure::bad("table: no image")),
         };
@@ -96,6 +102,9 @@ pub fn calibrate<'py>(
             .map_err(PythonFailure::bad)
         };
         let files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, PythonFailure>>()?;
+        let causes = extended.map_or(Ok(None), |subject| subject.known_table(&files)).map_err(PythonFailure::bad)?;
+        let causes = causes.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PythonFailure::bad)?;
+        let prior = causes.as_ref().map_or(prior, |table| Prior::of_table(table, kind));
         watch.tell_or_unwind(logs.len(), logs.len() + 1, "fitting".to_owned());
         let made = fit(&files, &prior).map_err(|error| calibration_failure(&error, &logs))?;
         watch.tell_or_unwind(logs.len() + 1, logs.len() + 1, "done".to_owned());
@@ -173,14 +182,11 @@ pub fn diagnose<'py>(
         let tell = |done: usize, of: usize, what: &str| watch.tell_or_unwind(done, of, what.to_owned());
         let done = diagnose_rows(recording.map_err(failed)?, &subject, &options, tell).map_err(failed)?;
         let made = done.extend(&subject, &options, || tell(4, 5, "FEM of the extended drive")).map_err(failed)?;
+        let files = made.table_files().into_iter().map(|(name, _)| name).collect::<Vec<_>>();
         let mut extension = made.extension;
         // As the command lists what it writes.
         extension.files.extend(made.drive_toml.as_ref().map(|_| "drive-extended.toml".to_owned()));
-        if let Some(table) = &made.table {
-            extension
-                .files
-                .extend(["fxt", "json", "rs", "h"].map(|ending| format!("{}-extended.{ending}", table.kind)));
-        }
+        extension.files.extend(files);
         let json = serde_json::to_string(&done.file(&extension, "")).map_err(PythonFailure::bad)?;
         let explanation = asked.map(|cause| {
             let explanation = Explanation::of(&done.diagnosis, cause);

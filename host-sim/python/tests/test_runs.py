@@ -123,7 +123,7 @@ def test_diagnose_is_the_command(log_file: Path, tmp_path: Path) -> None:
         ["diagnosis.json", *(name for name in theirs["extension"]["files"])]
     )
     if found.extended_table is not None:
-        assert found.extended_table.image == (tmp_path / "cam-extended.fxt").read_bytes()
+        assert found.extended_table.image == (tmp_path / found.table.file).read_bytes()
     again = flexspline.diagnose(log_file, model=tmp_path / "ours/drive-extended.toml")
     assert again.finding == "nothing_found", "the extended model holds the cause"
 

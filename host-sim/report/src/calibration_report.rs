@@ -38,15 +38,15 @@ pub fn page(made: &Calibrated) -> Page {
 fn headline(c: &Calibration) -> Headline {
     let kept = c.parts.iter().filter(|part| part.kept).count();
     let words = format!(
-        "The table of this unit has {kept} part{} in addition to the prior; where nothing was fitted it leaves {{}} \
-         rms of {{}}{}.",
+        "The table of this unit has {kept} part{} in addition to the prior; the core with it leaves {{}} rms of \
+         {{}} over all rows{}.",
         if kept == 1 { "" } else { "s" },
         if c.reading_delay.is_some() { ", the delay between the readings taken out" } else { "" }
     );
     Headline::new(
-        RichText::filled(&words, &[(c.held_out.rms_after_arcsec, 3), (c.held_out.rms_before_arcsec, 3)]),
-        RichText::arcsec(c.held_out.rms_after_arcsec, 3),
-        format!("left, rms, in {} left out", c.left_out),
+        RichText::filled(&words, &[(c.core.rms_after_arcsec, 3), (c.core.rms_before_arcsec, 3)]),
+        RichText::arcsec(c.core.rms_after_arcsec, 3),
+        "left by the core, rms over all rows".to_owned(),
     )
 }
 

@@ -8,13 +8,16 @@ use flexspline::Table;
 
 use super::context::{Context, quoted, table_image, table_of};
 use super::logs::LogOptions;
-use super::{Failure, bad_input, report, say};
+use super::{Failure, bad_file, bad_input, report, say};
 use flexspline_base::output::Outputs;
-use flexspline_design::tables::{c_header, rust_source};
+use flexspline_design::tables::{MadeTable, c_header, rust_source};
 use flexspline_identify::calibrate::{
     Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, one_in, plan,
 };
+use flexspline_identify::diagnosis::Subject;
+use flexspline_identify::extension::Model;
 use flexspline_identify::known_rows::read_known;
+use flexspline_identify::measurement::Recording;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::calibration_report;
 
@@ -50,7 +53,7 @@ pub(super) struct Calibrate {
     /// Folder of tables made by `flexspline tables`; the one of --generator is the starting point
     #[arg(long, value_name = "DIR")]
     tables: Option<PathBuf>,
-    /// Nominal model from the catalogue as the starting point
+    /// Nominal model from the catalogue as the starting point, or one extended with causes by `flexspline diagnose`
     #[arg(long, value_name = "nominal.toml")]
     model: Option<PathBuf>,
     /// Generator turns per output turn, negative if they turn in opposite directions, if nothing else is known
@@ -139,6 +142,9 @@ impl Calibrate {
             .map(|file| read_known(file, &map, &prior.nominal, prior.table))
             .collect::<Result<Vec<_>, _>>();
         let files = files.map_err(bad_input)?;
+        let known = self.known_table(context, &files)?;
+        let known = known.as_ref().map(|made| table_of(Path::new("drive-extended"), &made.image)).transpose()?;
+        let prior = known.as_ref().map_or(prior, |known| Prior::of_table(known, self.generator));
         let out = if self.more { context.out_for_plan(PLAN_BEGINS)? } else { context.out()? };
         if !self.no_report {
             report::before(context, out, "calibrate", None);
@@ -206,9 +212,17 @@ impl Calibrate {
             return Ok(Prior::of_table(table, self.generator));
         }
         if let Some(path) = &self.model {
-            return Prior::of_model(path, self.generator).map_err(bad_input);
+            return Prior::of_file(path, self.generator).map(|(prior, _)| prior).map_err(bad_input);
         }
         Prior::of_given_ratio(self.ratio.unwrap_or_default(), self.generator).map_err(bad_input)
+    }
+
+    /// The table of a model that holds causes, over what the logs hold: the starting point in its place.
+    fn known_table(&self, context: &Context, files: &[Recording]) -> Result<Option<MadeTable>, Failure> {
+        let Some(path) = &self.model else { return Ok(None) };
+        let model = Model::read(path).map_err(bad_input)?;
+        let made = Subject::of_model(model, context.drive()?, self.generator).known_table(files);
+        made.map_err(bad_file(path))
     }
 
     /// How the table is tried on another log.
@@ -359,17 +373,18 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         );
     }
     let as_measured = if c.reading_delay.is_some() { "as measured less the delay" } else { "as measured" };
-    let removed = 100.0 * (1.0 - held_out.rms_after_arcsec / held_out.rms_before_arcsec);
+    let removed = 100.0 * (1.0 - core.rms_after_arcsec / core.rms_before_arcsec);
     let _ = writeln!(
         text,
-        "where nothing was fitted, arcsec rms: {:.2} {as_measured}, {:.2} with what was known, {:.2} with the table \
+        "the core over all rows, reversals among them, arcsec rms: {:.2} {as_measured}, {:.2} with the table {} \
          ({removed:.1} % less)",
-        held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
+        core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
     );
     let _ = writeln!(
         text,
-        "the core over all rows, reversals among them: {:.2} {as_measured}, {:.2} with the table {}",
-        core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
+        "rows in steady motion, each left out of the fit, arcsec rms: {:.2} {as_measured}, {:.2} with what was known, \
+         {:.2} with the parts",
+        held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let width = c.play_width_arcsec;
     let _ = writeln!(

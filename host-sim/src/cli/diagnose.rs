@@ -11,13 +11,12 @@ use super::tables::fresh_table;
 use super::{Failure, bad_file, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::kernels::Kernels;
-use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::pipeline::{
     Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, read_rows,
 };
-use flexspline_identify::diagnosis::report::Diagnosis;
+use flexspline_identify::diagnosis::report::{Compensation, Diagnosis};
 use flexspline_identify::extension::Model;
 use flexspline_identify::measurement::Recording;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -28,8 +27,9 @@ use flexspline_mechanics::mesh::MeshLevel;
 /// Reads a CSV with a generator angle and an output angle (or error_arcsec), if wanted time_s, torque_n_m,
 /// temperature_c and orientation_rad; writes diagnosis.json. The nominal model is a catalogue's (--model) or that of a
 /// table (--tables). Where causes are found it writes drive-extended.toml, to be given again as the input was: with
-/// --model in the place of a nominal.toml, or with --drive beside --tables. Where tables that hold the causes leave
-/// less error in sessions that took no part, it writes <G>-extended.fxt, .json, .rs and .h.
+/// --model in the place of a nominal.toml, or with --drive beside --tables. Of two tables it writes the one that leaves
+/// less error in rows that took no part, if it leaves less than the nominal one and none: that of the causes as
+/// <G>-extended.fxt, that of a calibration of the same rows as calibrated.fxt, each with .json, .rs and .h.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -119,7 +119,8 @@ impl Diagnose {
         if !self.no_report {
             let inputs = [Some(self.data.as_path()), self.model.as_deref()];
             let (nominal, table) = (&subject.nominal, subject.table.as_ref());
-            let page = report::diagnosis(context, inputs, recording, nominal, table, diagnosis, extended);
+            let page =
+                report::diagnosis(context, inputs, recording, nominal, table, diagnosis, (extended, &extension.table));
             report::write(&page, out, &mut outputs)?;
         }
         outputs.finish()?;
@@ -186,22 +187,14 @@ impl Diagnose {
 
     /// Writes the extended drive and table, as far as they were made.
     fn write(&self, context: &Context, made: &mut Made, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
-        let Made { extension, drive_toml, table } = made;
-        let mut put = |name: String, content: &[u8]| -> Result<(), Failure> {
-            outputs.file(&out.join(&name), |file| file.write_all(content))?;
-            extension.files.push(name);
-            Ok(())
-        };
-        if let Some(toml) = drive_toml {
-            put("drive-extended.toml".to_owned(), (header(context) + toml).as_bytes())?;
+        if let Some(table) = &mut made.table {
+            table.info.command.clone_from(&context.command);
         }
-        if let Some(made) = table {
-            made.info.command.clone_from(&context.command);
-            let json = serde_json::to_vec_pretty(&made.info).map_err(|error| Failure::Failed(error.to_string()))?;
-            put(format!("{}-extended.fxt", made.kind), &made.image)?;
-            put(format!("{}-extended.json", made.kind), &json)?;
-            put(format!("{}-extended.rs", made.kind), rust_source(made).as_bytes())?;
-            put(format!("{}-extended.h", made.kind), c_header(made).as_bytes())?;
+        let toml = made.drive_toml.as_ref().map(|toml| (header(context) + toml).into_bytes());
+        let toml = toml.map(|toml| ("drive-extended.toml".to_owned(), toml));
+        for (name, content) in toml.into_iter().chain(made.table_files()) {
+            outputs.file(&out.join(&name), |file| file.write_all(&content))?;
+            made.extension.files.push(name);
         }
         Ok(())
     }
@@ -229,33 +222,21 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     for note in &recording.notes {
         text += &format!("note: {note}\n");
     }
+    let _ = writeln!(text, "{}", extension.table.text());
     text += &diagnosis.text();
     if let Some(evaluation) = &extension.compensation {
-        let _ = writeln!(
-            text,
-            "pointing error the core leaves in sessions held out, arcsec rms\n  session      rows   no table    \
-             nominal   extended"
-        );
-        for s in &evaluation.sessions {
+        text += "pointing error the core leaves in sessions held out, arcsec rms\n  session      rows   no table    \
+                 nominal calibrated   extended\n";
+        let mut line = |name: String, rows: usize, left: &Compensation| {
+            let calibrated = left.rms_calibrated_table_arcsec.map_or("–".to_owned(), |left| format!("{left:.2}"));
             let _ = writeln!(
                 text,
-                "  {:>7} {:>9} {:>10.2} {:>10.2} {:>10.2}",
-                s.session + 1,
-                s.rows,
-                s.rms_uncompensated_arcsec,
-                s.rms_nominal_tables_arcsec,
-                s.rms_extended_tables_arcsec
+                "  {name:>7} {rows:>9} {:>10.2} {:>10.2} {calibrated:>10} {:>10.2}",
+                left.rms_uncompensated_arcsec, left.rms_nominal_tables_arcsec, left.rms_extended_tables_arcsec
             );
-        }
-        let _ = writeln!(
-            text,
-            "  {:>7} {:>9} {:>10.2} {:>10.2} {:>10.2}",
-            "all",
-            evaluation.sessions.iter().map(|s| s.rows).sum::<usize>(),
-            evaluation.rms_uncompensated_arcsec,
-            evaluation.rms_nominal_tables_arcsec,
-            evaluation.rms_extended_tables_arcsec
-        );
+        };
+        evaluation.sessions.iter().for_each(|s| line((s.session + 1).to_string(), s.rows, &s.left));
+        line("all".to_owned(), evaluation.sessions.iter().map(|s| s.rows).sum(), &evaluation.left);
         for left in &evaluation.not_applied {
             let _ = writeln!(text, "  not in the tables: {}, {}", left.cause, left.reason);
         }
@@ -270,9 +251,6 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
                 "FEM of the extended drive: {:.2} arcsec rms from the causes found, of {:.2}",
                 agreement.difference_rms_arcsec, agreement.found_rms_arcsec
             );
-        }
-        if let Some(why) = &extension.tables_not_written {
-            let _ = writeln!(text, "no extended tables: {why}");
         }
     }
     let mut files = vec!["diagnosis.json".to_owned()];

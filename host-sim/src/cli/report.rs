@@ -12,8 +12,8 @@ use super::{Context, Failure, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::TableInfo;
 use flexspline_design::tables::validate::Validation;
-use flexspline_identify::diagnosis::Extended;
 use flexspline_identify::diagnosis::report::Diagnosis;
+use flexspline_identify::diagnosis::{Extended, WrittenTable};
 use flexspline_identify::measurement::Recording;
 use flexspline_identify::nominal::Nominal;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -77,7 +77,7 @@ pub(super) fn diagnosis<'p>(
     nominal: &Nominal,
     table: Option<&Table<'_>>,
     diagnosis: &Diagnosis,
-    extended: &Extended,
+    (extended, written): (&Extended, &WrittenTable),
 ) -> Page {
     let hashed = |path: &Path| {
         let bytes = std::fs::read(path).ok()?;
@@ -88,7 +88,16 @@ pub(super) fn diagnosis<'p>(
     let series = extended.predict(&recording.sessions, nominal, table);
     let (levels, parts) = diagnosis_report::levels_and_parts(&series, extended, diagnosis);
     let command = &context.command;
-    diagnosis_report::page(DiagnosisSources { recording, nominal, diagnosis, levels, parts, command, inputs })
+    diagnosis_report::page(DiagnosisSources {
+        recording,
+        nominal,
+        diagnosis,
+        table: written,
+        levels,
+        parts,
+        command,
+        inputs,
+    })
 }
 
 /// The page of every command.

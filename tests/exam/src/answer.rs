@@ -3,6 +3,8 @@
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
+use crate::logger::LoggerFault;
+
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Estimate {
     pub value: f64,
@@ -57,5 +59,19 @@ impl Answer {
             return Err(format!("verdict `{}`: none, explained, partly_explained or unknown", answer.verdict));
         }
         Ok(answer)
+    }
+
+    /// The answer that a refusal gives, exit code 2: another ratio, both named; or units, with the mapping that mends
+    /// this fault of the logger.
+    pub fn of_refusal(fault: Option<LoggerFault>, ended: &str, said: &str) -> Option<Self> {
+        let names_both = said.contains("ratio: found ") && said.contains(", but the generator turns ");
+        let mended = |fault: &LoggerFault| fault.refused_with().iter().any(|mapping| said.contains(mapping));
+        let name = if names_both { "ratio_mismatch" } else { fault.filter(mended)?.name() };
+        ended.ends_with("exit status: 2").then(|| Self {
+            verdict: "unknown".into(),
+            causes: Vec::new(),
+            data_faults: vec![DataFault { name: name.into() }],
+            held_out: None,
+        })
     }
 }

@@ -11,12 +11,11 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use crate::answer::{Answer, DataFault};
+use crate::answer::Answer;
 use crate::case::{Case, Draw};
 use crate::chance::Chance;
-use crate::logger::LoggerFault;
 use crate::score::{Gathered, Judged, judge};
-use crate::truth::commitment;
+use crate::truth::{Truth, commitment};
 
 /// Longest diagnosis, s.
 const LIMIT_S: f64 = 300.0;
@@ -75,7 +74,7 @@ pub fn run(settings: &Settings) -> io::Result<Examination> {
     let mut order: Vec<usize> = (0..truths.len()).collect();
     order.sort_by(|a, b| truths[*a].name.cmp(&truths[*b].name));
     let judged = in_parallel(settings.jobs, order, |at| {
-        let (answer, seconds) = ask(settings, &cases[at], &truths[at].name)?;
+        let (answer, seconds) = ask(settings, &cases[at], &truths[at])?;
         Ok(judge(&truths[at], &answer, seconds))
     });
     let cases = judged.into_iter().collect::<io::Result<Vec<Judged>>>()?;
@@ -103,9 +102,9 @@ pub fn cases(path: &Path) -> io::Result<Vec<Judged>> {
 }
 
 /// Writes the data of a case, has it diagnosed, and takes the data away.
-fn ask(settings: &Settings, case: &Case, name: &str) -> io::Result<(Result<Answer, String>, f64)> {
-    let given = settings.out.join("cases").join(name);
-    let answered = settings.out.join("answers").join(name);
+fn ask(settings: &Settings, case: &Case, truth: &Truth) -> io::Result<(Result<Answer, String>, f64)> {
+    let given = settings.out.join("cases").join(&truth.name);
+    let answered = settings.out.join("answers").join(&truth.name);
     fs::create_dir_all(&given)?;
     fs::create_dir_all(&answered)?;
     fs::write(given.join("data.csv"), case.data())?;
@@ -124,25 +123,19 @@ fn ask(settings: &Settings, case: &Case, name: &str) -> io::Result<(Result<Answe
     let start = Instant::now();
     let ended = wait(&mut command);
     let seconds = start.elapsed().as_secs_f64();
-    let said = fs::read_to_string(answered.join("stderr.txt")).unwrap_or_default();
-    if let Some(fault) = case.fault.filter(|fault| is_refused(*fault, &ended, &said)) {
-        let data_faults = vec![DataFault { name: fault.name().to_owned() }];
-        fs::remove_dir_all(&given)?;
-        let answer = Answer { verdict: "none".to_owned(), causes: Vec::new(), data_faults, held_out: None };
-        return Ok((Ok(answer), seconds));
-    }
-    let answer = ended.and_then(|()| {
-        let text = fs::read_to_string(answered.join("diagnosis.json")).map_err(|e| format!("diagnosis.json: {e}"))?;
-        Answer::read(&text).map_err(|error| format!("diagnosis.json: {error}"))
-    });
+    let read = |file: &str| fs::read_to_string(answered.join(file)).map_err(|error| format!("{file}: {error}"));
+    let answer = match ended {
+        Ok(()) => read("diagnosis.json")
+            .and_then(|text| Answer::read(&text).map_err(|error| format!("diagnosis.json: {error}"))),
+        // A run that ends at the ratio or the units has no diagnosis.json: right where these are what is wrong.
+        Err(error) => {
+            let said = read("stderr.txt").unwrap_or_default();
+            let of_refusal = Answer::of_refusal(case.fault, &error, &said);
+            of_refusal.filter(|answer| truth.accepts(answer)).ok_or(error)
+        }
+    };
     fs::remove_dir_all(&given)?;
     Ok((answer, seconds))
-}
-
-/// Whether the file of a fault of the logger is refused as bad input with the mapping that mends it.
-pub fn is_refused(fault: LoggerFault, ended: &Result<(), String>, said: &str) -> bool {
-    let bad_input = ended.as_ref().is_err_and(|why| why.ends_with("exit status: 2"));
-    bad_input && fault.refused_with().iter().any(|mapping| said.contains(mapping))
 }
 
 fn wait(command: &mut Command) -> Result<(), String> {

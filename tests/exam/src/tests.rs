@@ -9,6 +9,7 @@ use std::sync::LazyLock;
 use crate::answer::{Answer, DataFault, Estimate, HeldOut, Named};
 use crate::case::{Case, Draw, Family, Kind};
 use crate::exam::{self, Settings};
+use crate::logger::LoggerFault;
 use crate::rate::Rate;
 use crate::score::{Gathered, Judged, judge, reliability};
 use crate::truth::{Truth, commitment};
@@ -119,17 +120,19 @@ fn a_fault_by_another_name_misleads_nobody() {
 /// A refusal answers where it names the mapping that mends the file, and where no size may be changed unasked.
 #[test]
 fn a_refusal_that_mends_the_file_reports_the_fault() {
-    use crate::logger::LoggerFault::{DegreesAsRad, MillisecondsAsSeconds, OutputSign, Stalls};
-    let refused = Err("flexspline: exit status: 2".to_owned());
+    use LoggerFault::{DegreesAsRad, MillisecondsAsSeconds, OutputSign, Stalls};
+    let answers = |fault, code, said: &str| {
+        Answer::of_refusal(Some(fault), &format!("flexspline: exit status: {code}"), said).is_some()
+    };
     for (fault, said) in [
         (DegreesAsRad, "error: data.csv: ...; allowed: --columns output=output_rad:deg"),
         (OutputSign, "error: data.csv: ...; allowed: --columns output=output_rad:-rad, or the ratio -95"),
         (MillisecondsAsSeconds, "error: data.csv: ...; allowed: --columns time=time_s:ms, or time=time_s:s"),
     ] {
-        assert!(exam::is_refused(fault, &refused, said), "{said}");
-        assert!(!exam::is_refused(fault, &refused, "error: data.csv: units?"), "without the mapping");
-        assert!(!exam::is_refused(fault, &Err("flexspline: exit status: 1".to_owned()), said), "a failed run");
-        assert!(!exam::is_refused(Stalls, &refused, said), "a file that is to be read");
+        assert!(answers(fault, 2, said), "{said}");
+        assert!(!answers(fault, 2, "error: data.csv: units?"), "without the mapping");
+        assert!(!answers(fault, 1, said), "a failed run");
+        assert!(!answers(Stalls, 2, said), "a file that is to be read");
     }
 }
 
@@ -181,13 +184,32 @@ fn a_seed_repeats_a_case_and_the_data_hold_no_truth() {
 
 /// A run of null cases with a program of this script.
 fn run(out: &Path, script: &str) -> exam::Examination {
+    run_of(out, script, Draw { family: Some(Family::E), kind: Some(Kind::Null), ..Draw::default() })
+}
+
+fn run_of(out: &Path, script: &str, draw: Draw) -> exam::Examination {
     fs::create_dir_all(out).unwrap();
     let program = out.join("diagnoser");
     fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-    let draw = Draw { family: Some(Family::E), kind: Some(Kind::Null), ..Draw::default() };
     let (diagnoser, out) = (program.display().to_string(), out.to_owned());
     exam::run(&Settings { seed: Some(21), cases: 3, draw, diagnoser, jobs: 2, out }).unwrap()
+}
+
+#[test]
+fn a_run_that_ends_at_another_ratio_answers_where_the_ratio_is_wrong_alone() {
+    let desk = tempfile::tempdir().unwrap();
+    let refused = |ratio: &str, fault: Option<LoggerFault>, folder: &str| {
+        let kind = Some(if fault.is_some() { Kind::Logger } else { Kind::Null });
+        let draw = Draw { kind, fault, ..Draw::default() };
+        run_of(&desk.path().join(folder), &format!("echo 'data.csv: {ratio}' >&2\nexit 2"), draw).scores
+    };
+    let both = "ratio: found 100, but the generator turns 101.00 times for one turn of the output; allowed: 101";
+    let right = refused(both, Some(LoggerFault::RatioOffByOne), "right");
+    none(&right, &["failed", "logger_misled"]);
+    all(&right, &["logger_told"]);
+    all(&refused(both, None, "sound"), &["failed"]);
+    all(&refused("ratio: found 100", Some(LoggerFault::RatioOffByOne), "one"), &["failed"]);
 }
 
 #[test]

@@ -3,6 +3,8 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+use crate::answer::Answer;
+
 /// One hidden effect, or a fault of the logger.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Hidden {
@@ -65,6 +67,11 @@ impl Truth {
     /// As it is written and hashed.
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(self).expect("numbers and names") + "\n"
+    }
+
+    /// Whether the faults of the data in an answer are what is hidden.
+    pub fn accepts(&self, answer: &Answer) -> bool {
+        answer.data_faults.iter().all(|fault| self.hidden.iter().any(|hidden| hidden.is_called(&fault.name)))
     }
 
     /// An effect outside the library that a named cause fits as well.

@@ -8,7 +8,7 @@ use super::folds::{Chosen, Folds};
 pub(super) const PENALTIES: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 /// A part is kept if it takes at least this share of the squares left without it: one per cent of the error. Chosen on
 /// the two records of `examples/`.
-pub(super) const LEAST_GAIN: f64 = 0.02;
+pub(crate) const LEAST_GAIN: f64 = 0.02;
 
 /// Parts chosen one after another, the best first, as long as each gains: none, the first, the first two, and so on.
 pub(super) fn path(folds: &Folds, of: &[usize]) -> Vec<Vec<Chosen>> {
@@ -45,7 +45,7 @@ pub(super) fn pruned(folds: &Folds, of: &[usize], mut chosen: Vec<Chosen>) -> Ve
 
 /// The part, with its penalty, that leaves least beside those chosen.
 pub(super) fn best_next(folds: &Folds, of: &[usize], chosen: &[Chosen]) -> Option<(Chosen, f64)> {
-    let open = folds.parts().iter().filter(|part| chosen.iter().all(|chosen| chosen.part != **part));
+    let open = folds.parts.iter().filter(|part| chosen.iter().all(|chosen| chosen.part != **part));
     open.map(|part| best_penalty(folds, of, chosen, Chosen { part: *part, penalty: 0.0 }))
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -75,7 +75,7 @@ fn tuned(folds: &Folds, of: &[usize], chosen: &mut [Chosen]) -> f64 {
 /// with no part at most, with one, and so on.
 pub(super) fn nested(folds: &Folds) -> Vec<f64> {
     let all = folds.all();
-    let mut left = vec![0.0; folds.parts().len() + 1];
+    let mut left = vec![0.0; folds.parts.len() + 1];
     for fold in &all {
         let others: Vec<usize> = all.iter().copied().filter(|other| other != fold).collect();
         let path = path(folds, &others);

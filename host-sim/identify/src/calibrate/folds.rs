@@ -1,9 +1,13 @@
 //! Least squares with a penalty by sums over folds: what a fit to all folds but one leaves in that one costs no pass
 //! over the rows.
 
-use flexspline_algebra::{Mat, cholesky};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::rc::Rc;
 
-use super::parts::{PartName, Scales, State, columns, weights};
+use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State, columns, weights};
+use crate::linear::{Gram, Prior, solve};
 
 /// A row to fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,82 +28,27 @@ pub(super) struct Chosen {
     pub penalty: f64,
 }
 
-/// Sums over the rows of a fold, or of a log.
-#[derive(Debug, Clone)]
-pub(super) struct Sums {
-    /// Rows by their weights.
-    rows: f64,
-    /// Columns, and what the prior leaves.
-    columns: Vec<f64>,
-    left: f64,
-    /// Products of columns with each other (lower triangle), of each with what is left, and the square of that.
-    gram: Vec<f64>,
-    right: Vec<f64>,
-    square: f64,
-}
-
-impl Sums {
-    pub fn new(width: usize) -> Sums {
-        let (columns, right, gram) = (vec![0.0; width], vec![0.0; width], vec![0.0; width * width]);
-        Sums { rows: 0.0, columns, left: 0.0, gram, right, square: 0.0 }
-    }
-
-    /// Adds a row that counts `weight` times.
-    pub fn add(&mut self, x: &[f64], left: f64, weight: f64) {
-        for (i, a) in x.iter().enumerate() {
-            let a = weight * a;
-            self.columns[i] += a;
-            self.right[i] += a * left;
-            let row = &mut self.gram[i * x.len()..];
-            row.iter_mut().zip(&x[..=i]).for_each(|(sum, b)| *sum += a * b);
-        }
-        self.rows += weight;
-        self.left += weight * left;
-        self.square += weight * left * left;
-    }
-
-    /// Adds rows with the same zero.
-    pub fn join(&mut self, other: &Sums) {
-        let of = [(&mut self.columns, &other.columns), (&mut self.gram, &other.gram), (&mut self.right, &other.right)];
-        of.into_iter().flat_map(|(a, b)| a.iter_mut().zip(b)).for_each(|(a, b)| *a += b);
-        self.rows += other.rows;
-        self.left += other.left;
-        self.square += other.square;
-    }
-
-    /// The same where the zero is found in these rows.
-    fn with_own_zero(mut self) -> Sums {
-        let width = self.columns.len();
-        for i in (0..width).filter(|_| self.rows > 0.0) {
-            self.right[i] -= self.columns[i] * self.left / self.rows;
-            for j in 0..=i {
-                self.gram[i * width + j] -= self.columns[i] * self.columns[j] / self.rows;
-            }
-        }
-        self.square -= if self.rows > 0.0 { self.left * self.left / self.rows } else { 0.0 };
-        self
-    }
-
-    /// Adds the information on the coefficients, the zero of the rows not known.
-    pub fn add_information(&self, to: &mut Mat) {
-        let own = self.clone().with_own_zero();
-        for (i, j) in (0..self.columns.len()).flat_map(|i| (0..=i).map(move |j| (i, j))) {
-            to[(i, j)] += own.gram[i * self.columns.len() + j];
-            to[(j, i)] = to[(i, j)];
-        }
-    }
-}
+/// Folds, and places of parts with the bits of their penalties.
+type Asked = (Vec<usize>, Vec<(Option<usize>, u64)>);
 
 /// All folds.
 pub(super) struct Folds {
-    parts: Vec<PartName>,
+    pub parts: Vec<PartName>,
     /// First column of each part, and the end.
     begins: Vec<usize>,
     weights: Vec<f64>,
-    sums: Vec<Sums>,
+    /// Rows in each fold, and the products of its columns.
+    rows: Vec<f64>,
+    sums: Vec<Gram>,
+    /// Of a row: the curve over the output where nothing was recorded, as good as zero.
+    unrecorded: Gram,
+    /// Sums of the products over folds, of each set of folds that was fitted to.
+    joined: RefCell<HashMap<Vec<usize>, Rc<Gram>>>,
+    /// What [`Folds::left_out`] found for folds, and parts with their penalties.
+    found: RefCell<HashMap<Asked, f64>>,
 }
 
-/// Diagonal that keeps a matrix definite where a column says nothing, of a row.
+/// Precision that keeps a matrix definite where a column says nothing, of a row.
 pub(super) const FLOOR: f64 = 1e-9;
 
 impl Folds {
@@ -113,87 +62,71 @@ impl Folds {
             all.extend(weights(*part));
         }
         begins.push(all.len());
-        let width = all.len();
         let folds = rows.iter().map(|row| row.fold + 1).max().unwrap_or(0);
-        let mut sums = vec![Sums::new(width); folds];
-        let mut x = Vec::with_capacity(width);
+        // One, the columns, and the value.
+        let mut sums = vec![Gram::none(all.len() + 2); folds];
+        let mut x = Vec::with_capacity(all.len() + 2);
         for row in rows {
             x.clear();
-            x.resize(zeros, 0.0);
-            if zeros > 0 {
-                x[row.at.log] = 1.0;
-            }
+            x.push(1.0);
+            x.extend((0..zeros).map(|log| f64::from(log == row.at.log)));
             parts.iter().for_each(|part| columns(*part, &row.at, scales, &mut x));
-            sums[row.fold].add(&x, row.left_arcsec, 1.0);
+            x.push(row.left_arcsec);
+            sums[row.fold].add_row(&x, 1.0);
         }
-        if own_zero {
-            sums = sums.into_iter().map(Sums::with_own_zero).collect();
-        }
-        Folds { parts: parts.to_vec(), begins, weights: all, sums }
-    }
-
-    pub fn parts(&self) -> &[PartName] {
-        &self.parts
+        let rows = sums.iter().map(|sum| sum.at(0, 0)).collect();
+        let columns: Vec<usize> = (1..all.len() + 2).collect();
+        sums.iter_mut().for_each(|sum| *sum = if own_zero { sum.first_free() } else { sum.among(&columns) });
+        let unrecorded = unrecorded(parts, scales, &begins);
+        let (joined, found) = (RefCell::default(), RefCell::default());
+        Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, unrecorded, joined, found }
     }
 
     /// Folds that hold rows.
     pub fn all(&self) -> Vec<usize> {
-        (0..self.sums.len()).filter(|fold| self.sums[*fold].rows > 0.0).collect()
+        (0..self.rows.len()).filter(|fold| self.rows[*fold] > 0.0).collect()
     }
 
     /// Rows in some folds.
     pub fn rows(&self, folds: &[usize]) -> f64 {
-        folds.iter().map(|fold| self.sums[*fold].rows).sum()
+        folds.iter().map(|fold| self.rows[*fold]).sum()
     }
 
-    /// The columns of the parts chosen, those of the zeros first.
-    fn places(&self, chosen: &[Chosen]) -> Vec<usize> {
-        let of = |part: PartName| self.parts.iter().position(|other| *other == part);
-        let zeros = 0..self.begins[0];
-        let mut places: Vec<usize> = zeros.collect();
-        for at in chosen.iter().filter_map(|chosen| of(chosen.part)) {
-            places.extend(self.begins[at]..self.begins[at + 1]);
+    /// The columns of the zeros, of the parts chosen, and the value; the penalties of all but the last.
+    fn places(&self, chosen: &[Chosen]) -> (Vec<usize>, Vec<f64>) {
+        let (mut places, mut penalties): (Vec<usize>, Vec<f64>) = (0..self.begins[0]).map(|zero| (zero, 0.0)).unzip();
+        for chosen in chosen {
+            let Some(at) = self.parts.iter().position(|part| *part == chosen.part) else { continue };
+            let columns = self.begins[at]..self.begins[at + 1];
+            penalties.extend(self.weights[columns.clone()].iter().map(|weight| chosen.penalty * weight));
+            places.extend(columns);
         }
-        places
+        places.push(self.weights.len());
+        (places, penalties)
+    }
+
+    /// Products over some folds, with those where nothing was recorded.
+    fn joined(&self, folds: &[usize]) -> Rc<Gram> {
+        let join = || {
+            let mut gram = Gram::none(self.unrecorded.size);
+            gram.add(&self.unrecorded, self.rows(folds));
+            folds.iter().for_each(|fold| gram.add(&self.sums[*fold], 1.0));
+            Rc::new(gram)
+        };
+        Rc::clone(self.joined.borrow_mut().entry(folds.to_vec()).or_insert_with(join))
     }
 
     /// Coefficients of the zeros, then of each part chosen, fitted to some folds; those in `held`, counted without the
     /// zeros, keep the value given there, and the others are the best with them.
     pub fn fit(&self, folds: &[usize], chosen: &[Chosen], held: &[(usize, f64)]) -> Option<Vec<f64>> {
-        let places = self.places(chosen);
-        if places.is_empty() {
-            return Some(Vec::new());
+        let ((places, penalties), rows) = (self.places(chosen), self.rows(folds));
+        let gram = self.joined(folds).among(&places);
+        let prior = |penalty: &f64| Prior { mean: 0.0, std: ((penalty + FLOOR) * rows).sqrt().recip() };
+        let mut priors: Vec<Prior> = penalties.iter().map(prior).collect();
+        for &(coefficient, mean) in held {
+            priors[self.begins[0] + coefficient] = Prior { mean, std: 0.0 };
         }
-        let width = self.weights.len();
-        let rows = self.rows(folds);
-        let penalty_of = |place: usize| {
-            let at = self.begins.iter().rposition(|begin| *begin <= place)?;
-            let part = self.parts.get(at)?;
-            chosen.iter().find(|chosen| chosen.part == *part).map(|chosen| chosen.penalty)
-        };
-        let mut gram = Mat::zeros(places.len(), places.len());
-        let mut right = Mat::zeros(places.len(), 1);
-        for (i, a) in places.iter().enumerate() {
-            for (j, b) in places.iter().enumerate().take(i + 1) {
-                let (high, low) = (*a.max(b), *a.min(b));
-                let sum: f64 = folds.iter().map(|fold| self.sums[*fold].gram[high * width + low]).sum();
-                gram[(i, j)] = sum;
-                gram[(j, i)] = sum;
-            }
-            let penalty = penalty_of(*a).unwrap_or(0.0) * self.weights[*a];
-            gram[(i, i)] += (penalty + FLOOR) * rows;
-            right[(i, 0)] = folds.iter().map(|fold| self.sums[*fold].right[*a]).sum();
-        }
-        for &(coefficient, value) in held {
-            let of = self.begins[0] + coefficient;
-            for i in 0..places.len() {
-                right[(i, 0)] -= gram[(i, of)] * value;
-                (gram[(i, of)], gram[(of, i)]) = (0.0, 0.0);
-            }
-            (gram[(of, of)], right[(of, 0)]) = (1.0, value);
-        }
-        let solved = cholesky(gram.as_ref()).ok()?.solve(right.as_ref());
-        Some((0..places.len()).map(|i| solved[(i, 0)]).collect())
+        Some(solve(&gram, &priors, 1.0)?.coefficients)
     }
 
     /// Coefficients of the parts chosen, fitted to all folds, some of them held.
@@ -201,28 +134,42 @@ impl Folds {
         Some(self.fit(&self.all(), chosen, held)?.split_off(self.begins[0]))
     }
 
-    /// Sum of squares, arcsec², that these coefficients leave in a fold.
-    fn left(&self, fold: usize, chosen: &[Chosen], coefficients: &[f64]) -> f64 {
-        let (places, width, sums) = (self.places(chosen), self.weights.len(), &self.sums[fold]);
-        let mut left = sums.square;
-        for (i, (a, ca)) in places.iter().zip(coefficients).enumerate() {
-            left -= 2.0 * ca * sums.right[*a];
-            for (j, (b, cb)) in places.iter().zip(coefficients).enumerate().take(i + 1) {
-                let (high, low) = (*a.max(b), *a.min(b));
-                left += if i == j { 1.0 } else { 2.0 } * ca * cb * sums.gram[high * width + low];
-            }
-        }
-        left.max(0.0)
-    }
-
     /// Residual of a fit to `folds` in another fold, arcsec².
     pub(crate) fn left_in(&self, fold: usize, folds: &[usize], chosen: &[Chosen]) -> f64 {
-        self.fit(folds, chosen, &[]).map_or(f64::INFINITY, |coefficients| self.left(fold, chosen, &coefficients))
+        let left = |coefficients: Vec<f64>| self.sums[fold].among(&self.places(chosen).0).left_by(&coefficients);
+        self.fit(folds, chosen, &[]).map_or(f64::INFINITY, left)
     }
 
     /// Residual of fits to all of `folds` but one in that one, summed over all, arcsec².
     pub fn left_out(&self, folds: &[usize], chosen: &[Chosen]) -> f64 {
-        let others = |fold: usize| -> Vec<usize> { folds.iter().copied().filter(|other| *other != fold).collect() };
-        folds.iter().map(|fold| self.left_in(*fold, &others(*fold), chosen)).sum()
+        let of = |chosen: &Chosen| (self.parts.iter().position(|part| *part == chosen.part), chosen.penalty.to_bits());
+        let mut parts: Vec<_> = chosen.iter().map(of).collect();
+        parts.sort_unstable();
+        // The choice asks again for what it has tried.
+        let mut found = self.found.borrow_mut();
+        *found.entry((folds.to_vec(), parts)).or_insert_with(|| {
+            let others = |fold: usize| -> Vec<usize> { folds.iter().copied().filter(|other| *other != fold).collect() };
+            folds.iter().map(|fold| self.left_in(*fold, &others(*fold), chosen)).sum()
+        })
     }
+}
+
+/// Products of the curve over the output in parts of its turn without rows, for each row there is: they count as if
+/// zero had been recorded there, as often as rows were recorded elsewhere. Waves that are fitted to a part of the turn
+/// swing in the rest of it.
+fn unrecorded(parts: &[PartName], scales: &Scales, begins: &[usize]) -> Gram {
+    let width = begins.last().copied().unwrap_or(0);
+    let mut gram = Gram::none(width + 1);
+    let Some(curve) = parts.iter().position(|part| *part == PartName::OutputAngle) else { return gram };
+    let weight = 1.0 / (PARTS_OF_A_TURN - scales.unrecorded.count_ones() as usize).max(1) as f64;
+    let mut x = Vec::with_capacity(width + 1);
+    for part in (0..PARTS_OF_A_TURN).filter(|part| scales.unrecorded >> part & 1 == 1) {
+        let output_rad = TAU * (part as f64 + 0.5) / PARTS_OF_A_TURN as f64;
+        x.clear();
+        x.resize(begins[curve], 0.0);
+        columns(PartName::OutputAngle, &State { output_rad, ..State::default() }, scales, &mut x);
+        x.resize(width + 1, 0.0);
+        gram.add_row(&x, weight);
+    }
+    gram
 }

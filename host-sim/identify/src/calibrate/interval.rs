@@ -12,13 +12,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use flexspline_algebra::{Mat, cholesky};
 use flexspline_base::robust::dot;
 use serde::Serialize;
 
 use super::Model;
-use super::folds::{FLOOR, Row, Sums};
+use super::folds::{FLOOR, Row};
 use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, usual_arcsec, weights};
+use crate::linear::{Gram, Prior, Solution, solve};
 use crate::measurement::{median_of, white_noise};
 
 /// Standard deviations of an interval that holds 95 %.
@@ -31,41 +31,41 @@ const FEWEST_STRETCHES: usize = 20;
 /// A stretch over this many steps of a resolution averages them out. A guess.
 const STEPS_OF_A_STRETCH: f64 = 4.0;
 
-/// The information of all groups together, their zeros not known.
-fn gram(groups: &[Sums], width: usize) -> Mat {
-    let mut gram = Mat::zeros(width, width);
-    groups.iter().for_each(|group| group.add_information(&mut gram));
-    gram
+/// Standard deviation of a coefficient that nothing is known of, arcsec.
+const UNKNOWN_ARCSEC: f64 = 1e9;
+
+/// Knowledge of a coefficient before the rows, for the variance of a row.
+fn before(mean: f64, precision: f64, of_a_row: f64) -> Prior {
+    Prior { mean, std: (of_a_row * (precision + FLOOR)).sqrt().recip().min(UNKNOWN_ARCSEC) }
 }
 
-/// The inverse of a matrix with something on its diagonal.
-fn inverse(mut gram: Mat, diagonal: &[f64]) -> Option<Mat> {
-    diagonal.iter().enumerate().for_each(|(i, value)| gram[(i, i)] += value);
-    Some(cholesky(gram.as_ref()).ok()?.inverse())
+/// The coefficients after the rows of groups whose first column, their zero, is free in each.
+fn after(groups: &[Gram], priors: &[Prior]) -> Option<Solution> {
+    let mut all = Gram::none(priors.len() + 1);
+    groups.iter().for_each(|group| all.add(&group.first_free(), 1.0));
+    solve(&all, priors, 1.0)
 }
 
-/// Covariance of the coefficients of a drive that nobody has measured after these rows, arcsec², for the variance of a
-/// row.
-pub(super) fn planned_covariance(groups: &[Sums], parts: &[PartName], scales: &Scales, of_a_row: f64) -> Option<Mat> {
+/// Covariance of the coefficients of a drive that nobody has measured after these rows, arcsec², row by row, for the
+/// variance of a row.
+pub(super) fn planned_covariance(
+    groups: &[Gram],
+    parts: &[PartName],
+    scales: &Scales,
+    of_a_row: f64,
+) -> Option<Vec<f64>> {
     let known = |part: &PartName| {
-        let before = usual_arcsec(*part, scales).powi(2);
-        weights(*part).into_iter().map(move |weight| of_a_row * (weight / before + FLOOR))
+        let usual = usual_arcsec(*part, scales).powi(2);
+        weights(*part).into_iter().map(move |weight| before(0.0, weight / usual, of_a_row))
     };
-    let penalties: Vec<f64> = parts.iter().flat_map(known).collect();
-    let mut covariance = inverse(gram(groups, penalties.len()), &penalties)?;
-    for i in 0..penalties.len() {
-        (0..penalties.len()).for_each(|j| covariance[(i, j)] *= of_a_row);
-    }
-    Some(covariance)
+    let priors: Vec<Prior> = parts.iter().flat_map(known).collect();
+    Some(after(groups, &priors)?.covariance().into_iter().map(|of_one| of_a_row * of_one).collect())
 }
 
 /// Variance of `x c`.
-pub(super) fn variance(covariance: &Mat, x: &[f64]) -> f64 {
-    let mut sum = 0.0;
-    for (i, a) in x.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-        sum += a * x.iter().enumerate().map(|(j, b)| covariance[(i, j)] * b).sum::<f64>();
-    }
-    sum.max(0.0)
+pub(super) fn variance(covariance: &[f64], x: &[f64]) -> f64 {
+    let rows = covariance.chunks_exact(x.len().max(1));
+    rows.zip(x).filter(|(_, a)| **a != 0.0).map(|(row, a)| a * dot(row, x)).sum::<f64>().max(0.0)
 }
 
 /// How many columns some parts have.
@@ -78,6 +78,11 @@ pub(super) fn row(parts: &[PartName], at: &State, scales: &Scales) -> Vec<f64> {
     let mut x = Vec::new();
     parts.iter().for_each(|part| columns(*part, at, scales, &mut x));
     x
+}
+
+/// The same as a row of a group: one for its zero first, the value last.
+pub(super) fn row_of_group(parts: &[PartName], at: &State, scales: &Scales, value: f64) -> Vec<f64> {
+    [vec![1.0], row(parts, at, scales), vec![value]].concat()
 }
 
 /// Noise of the rows.
@@ -191,7 +196,7 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
 }
 
 /// The half widths of all nodes of some parts, from the covariance; in the order of the parts.
-pub(super) fn widths(parts: &[PartName], scales: &Scales, covariance: &Mat, model: Option<&Model>) -> Vec<Node> {
+pub(super) fn widths(parts: &[PartName], scales: &Scales, covariance: &[f64], model: Option<&Model>) -> Vec<Node> {
     let all = width_of(parts);
     let mut begin = 0;
     let mut nodes = Vec::new();
@@ -216,6 +221,21 @@ fn usual_step(rows: &[Row], angle: fn(&State) -> f64) -> f64 {
     if steps.is_empty() { 0.0 } else { median_of(&mut steps) }
 }
 
+/// What a model leaves of the rows of each log about its mean, arcsec, and the noise in that.
+pub(super) fn left_by(rows: &[Row], model: &Model, logs: usize, coarse_rad: f64) -> (Vec<Vec<f64>>, Noise) {
+    let mut left = vec![Vec::new(); logs];
+    rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
+    for file in &mut left {
+        let mean = file.iter().sum::<f64>() / file.len().max(1) as f64;
+        file.iter_mut().for_each(|value| *value -= mean);
+    }
+    let step_rad = usual_step(rows, |at| at.output_rad);
+    let rows_of_a_step = if step_rad > 0.0 { coarse_rad / step_rad } else { 0.0 };
+    let fitted = model.coefficients.len() + logs;
+    let noise = Noise::of(&left, fitted, usual_step(rows, |at| at.generator_rad), rows_of_a_step);
+    (left, noise)
+}
+
 /// How well a fitted model is known.
 #[derive(Debug, Clone)]
 pub struct Known {
@@ -223,7 +243,7 @@ pub struct Known {
     /// The parts of the model, and the delay of each log.
     parts: Vec<PartName>,
     /// Of what the fit misses in their coefficients, arcsec².
-    covariance: Mat,
+    covariance: Vec<f64>,
     /// What stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the fit.
     of_no_part_arcsec: f64,
     /// Noise of the rows.
@@ -242,52 +262,36 @@ impl Known {
         left_out_arcsec: f64,
     ) -> Option<Known> {
         let (scales, logs) = (&model.scales, delays.len());
-        let mut left = vec![Vec::new(); logs];
-        rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
-        for file in &mut left {
-            let mean = file.iter().sum::<f64>() / file.len().max(1) as f64;
-            file.iter_mut().for_each(|value| *value -= mean);
-        }
-        let step_rad = usual_step(rows, |at| at.output_rad);
-        let rows_of_a_step = if step_rad > 0.0 { coarse_rad / step_rad } else { 0.0 };
-        let noise =
-            Noise::of(&left, model.coefficients.len() + logs, usual_step(rows, |at| at.generator_rad), rows_of_a_step);
-
+        let (left, noise) = left_by(rows, model, logs, coarse_rad);
         let in_table = model.chosen.iter().filter(|chosen| !matches!(chosen.part, PartName::ReadingDelay(_)));
         let mut parts: Vec<PartName> = in_table.map(|chosen| chosen.part).collect();
-        let (mut fitted, mut before) = (Vec::new(), Vec::new());
+        let of_a_row = noise.of_a_row();
+        // About what was fitted: what the rows would still move, and how far they leave it open.
+        let mut priors: Vec<Prior> = Vec::new();
         for part in &parts {
             let of_part = model.of(*part).map_or(&[][..], |of| &model.coefficients[of]);
             let expected = expected_arcsec(*part, scales, of_part).powi(2).max(f64::MIN_POSITIVE);
-            fitted.extend(of_part);
-            before.extend(weights(*part).into_iter().map(|weight| weight / expected));
+            let known = of_part.iter().zip(weights(*part));
+            priors.extend(known.map(|(fitted, weight)| before(-fitted, weight / expected, of_a_row)));
         }
         if scales.speed_rad_s > 0.0 {
             for (log, delay) in delays.iter().enumerate() {
                 let part = PartName::ReadingDelay(log);
                 parts.push(part);
-                fitted.push(model.of(part).map_or(*delay, |of| model.coefficients[of.start]));
-                before.push(expected_arcsec(part, scales, &[]).powi(-2));
+                let fitted = model.of(part).map_or(*delay, |of| model.coefficients[of.start]);
+                priors.push(before(-fitted, expected_arcsec(part, scales, &[]).powi(-2), of_a_row));
             }
         }
-        let width = fitted.len();
-        let of_a_row = noise.of_a_row();
-        let penalties: Vec<f64> = before.iter().map(|before| of_a_row * (before + FLOOR)).collect();
-        let mut groups = vec![Sums::new(width); logs];
-        let mut right: Vec<f64> = penalties.iter().zip(&fitted).map(|(penalty, fitted)| -penalty * fitted).collect();
+        let mut groups = vec![Gram::none(priors.len() + 2); logs];
         let mut of_logs: Vec<_> = left.iter().map(|left| left.iter()).collect();
         for at in rows {
-            let x = row(&parts, &at.at, scales);
-            groups[at.at.log].add(&x, at.left_arcsec, 1.0);
             let left = of_logs[at.at.log].next().copied().unwrap_or_default();
-            right.iter_mut().zip(&x).for_each(|(right, x)| *right += x * left);
+            groups[at.at.log].add_row(&row_of_group(&parts, &at.at, scales, left), 1.0);
         }
-        let mut covariance = inverse(gram(&groups, width), &penalties)?;
-        let of = |i: usize| right.iter().enumerate().map(|(j, right)| covariance[(i, j)] * right).sum::<f64>();
-        let off: Vec<f64> = (0..width).map(of).collect();
-        for i in 0..width {
-            (0..width).for_each(|j| covariance[(i, j)] = of_a_row * covariance[(i, j)] + off[i] * off[j]);
-        }
+        let after = after(&groups, &priors)?;
+        let off = &after.coefficients;
+        let pairs = off.iter().flat_map(|a| off.iter().map(move |b| a * b));
+        let covariance = after.covariance().iter().zip(pairs).map(|(of_one, pair)| of_a_row * of_one + pair).collect();
         let everywhere = Noise { rms_arcsec: noise.rms_arcsec.max(left_out_arcsec), ..noise };
         let of_no_part_arcsec = everywhere.beside_white_arcsec();
         Some(Known { model: model.clone(), parts, covariance, of_no_part_arcsec, noise })
@@ -313,7 +317,7 @@ impl Known {
     pub(super) fn std_of_delay(&self, log: usize) -> Option<f64> {
         let at = self.parts.iter().position(|part| *part == PartName::ReadingDelay(log))?;
         let place = width_of(&self.parts[..at]);
-        Some(self.covariance[(place, place)].sqrt())
+        Some(self.covariance[place * width_of(&self.parts) + place].sqrt())
     }
 
     /// Every node of every part.

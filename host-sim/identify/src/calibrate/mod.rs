@@ -29,7 +29,8 @@ use flexspline::{ImageError, Table, WriteError};
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
-use choose::{LEAST_GAIN, best_penalty, nested, path, pruned};
+pub(crate) use choose::LEAST_GAIN;
+use choose::{best_penalty, nested, path, pruned};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
@@ -42,6 +43,7 @@ pub use reading::{ByCore, Reading, ReadingDelay};
 use reading::{Delays, play_of_a_millisecond};
 pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
+
 use together::Agreement;
 pub(crate) use zero::{Alignment, OutputZero, ZeroCost, cost};
 
@@ -61,8 +63,11 @@ const OTHER_DEAD_ZONE: f64 = 0.8;
 const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
 const BOTH_WAYS: f64 = 0.1;
-/// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output.
+/// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output, whose curve
+/// is smooth over a period of its highest wave…
 const MOST_OF_A_TURN: f64 = 0.75;
+const PERIOD_OF_THE_OUTPUT: f64 = 1.0 / parts::OUTPUT_ORDERS as f64;
+/// …and is held at zero in the rest of the turn where less than this was recorded.
 const HALF_A_TURN: f64 = 0.5;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;
@@ -76,6 +81,8 @@ const OTHER_RATIO: f64 = 0.25;
 /// Error by a wrong ratio in one of several logs, at least, rad rms: a load that grows over a short log looks the same.
 /// A guess: 15 arc-minutes, where wind-up and clearance are a few.
 const LEAST_OF_OTHER_RATIO_RAD: f64 = 0.0044;
+/// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
+const MOST_ERROR_RAD: f64 = 0.0175;
 /// Arcsec that are taken for rounding.
 const ROUNDING_ARCSEC: f64 = 1e-6;
 /// Coefficients of the play, and so the times that one of them is put on its bound and the others fitted anew.
@@ -131,13 +138,7 @@ impl CalibrationError {
     /// Whether the input is to blame.
     #[must_use]
     pub fn is_bad_input(&self) -> bool {
-        matches!(
-            self,
-            CalibrationError::Measured(_)
-                | CalibrationError::Known(_)
-                | CalibrationError::Ratio { .. }
-                | CalibrationError::TooFew(_)
-        )
+        !matches!(self, CalibrationError::NothingGained(_) | CalibrationError::Table(_))
     }
 }
 
@@ -164,15 +165,10 @@ impl Model {
 
     /// Where the coefficients of a part stand.
     fn of(&self, part: PartName) -> Option<std::ops::Range<usize>> {
-        let mut begin = 0;
-        for chosen in &self.chosen {
-            let width = parts::weights(chosen.part).len();
-            if chosen.part == part {
-                return Some(begin..begin + width);
-            }
-            begin += width;
-        }
-        None
+        let width = |part: PartName| parts::weights(part).len();
+        let at = self.chosen.iter().position(|chosen| chosen.part == part)?;
+        let begin = self.chosen[..at].iter().map(|chosen| width(chosen.part)).sum();
+        Some(begin..begin + width(part))
     }
 
     /// The whole play that it has at most beside the prior's, arcsec.
@@ -458,6 +454,16 @@ impl OtherRatio {
     }
 }
 
+/// The same of one log: said and not refused where the output moves little and errs as one of a gear may.
+pub(crate) fn check_ratio_of(log: &Recording, ratio: f64) -> Result<Option<String>, OtherRatio> {
+    let Some(other) = OtherRatio::of(std::slice::from_ref(log), ratio) else { return Ok(None) };
+    let (from, to) = least_and_most(log.sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
+    let moves_little = (to - from) / ratio.abs() < PERIOD_OF_THE_OUTPUT * std::f64::consts::TAU;
+    // A load that grows over a few rows looks the same.
+    let may_be_load = moves_little && other.error_rad < MOST_ERROR_RAD;
+    if other.is_far() && !may_be_load { Err(other) } else { Ok(Some(other.to_string())) }
+}
+
 /// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
 /// which the one gains a wave on the other.
 fn turns_to_tell_wheels(ratio: f64) -> f64 {
@@ -475,11 +481,28 @@ fn given_twice(files: &[Recording]) -> Option<[&str; 2]> {
     same.next().map(|(j, k)| [files[j].file.as_str(), files[k].file.as_str()])
 }
 
-/// Makes the table of a unit from its logs.
+/// Makes the table of a unit from its logs, and says how well it is known.
 ///
 /// # Errors
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
+    from_logs(files, prior, |logs, prior, rows, said| FittedTable::of(logs, prior, rows)?.calibrated(logs, said))
+}
+
+/// The table alone.
+///
+/// # Errors
+/// As [`calibrate`].
+pub(crate) fn table_of(files: &[Recording], prior: &Prior<'_>) -> Result<MadeTable, CalibrationError> {
+    from_logs(files, prior, |logs, prior, rows, _| Ok(FittedTable::of(logs, prior, rows)?.table))
+}
+
+/// What is `made` of the logs, their rows in steady motion, and what is noted of the ratio.
+fn from_logs<T>(
+    files: &[Recording],
+    prior: &Prior<'_>,
+    made: impl FnOnce(&Logs<'_>, &Prior<'_>, (Rows, Recorded), Vec<String>) -> Result<T, CalibrationError>,
+) -> Result<T, CalibrationError> {
     if let Some([one, other]) = given_twice(files) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
@@ -506,7 +529,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     }
     let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
     let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
-    with_dead_zone(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files, &notes))
+    made(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files, &notes))
 }
 
 /// Logs with delays between the readings, and without.
@@ -521,146 +544,163 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     let mut pieces: Vec<Recording> = Vec::new();
     for session in &file.sessions {
         if pieces.is_empty() || session.own_zero {
-            let whole = if pieces.is_empty() { Some(file) } else { None };
-            pieces.push(Recording {
-                file: file.file.clone(),
-                rows: file.rows,
-                sessions: Vec::new(),
-                faults: whole.map_or_else(Vec::new, |file| file.faults.clone()),
-                tooth_steps: whole.map_or_else(Vec::new, |file| file.tooth_steps.clone()),
-                notes: whole.map_or_else(Vec::new, |file| file.notes.clone()),
-                unusable: file.unusable.clone(),
-            });
+            pieces.push(file.with_sessions(Vec::new()));
         }
         if let Some(piece) = pieces.last_mut() {
             piece.sessions.push(session.clone());
         }
     }
+    if let Some(first) = pieces.first_mut() {
+        (first.faults, first.notes) = (file.faults.clone(), file.notes.clone());
+    }
     pieces
 }
 
-/// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `said` is what is noted of
-/// the ratio.
-fn with_dead_zone(
-    logs: &Logs<'_>,
-    prior: &Prior<'_>,
-    (rows, recorded): (Rows, Recorded),
-    said: Vec<String>,
-) -> Result<Calibrated, CalibrationError> {
-    let prior = &Prior { least_friction_n_m: recorded.scales.friction_n_m, ..prior.clone() };
-    let alignment = prior.table.map(|table| zero::align(table, &rows, recorded.scales.friction_n_m));
-    let aligned = Prior {
-        zero_rad: alignment
-            .as_ref()
-            .filter(|found| found.told)
-            .map_or(0.0, |found| found.generator_zero_deg.to_radians()),
-        ..prior.clone()
-    };
-    let (prior, files) = (&aligned, logs.at_one_instant);
-    let fitted_without = |without: &[Without]| {
-        let fitted = fit_outside_play(files, prior, (rows.clone(), &recorded), without)?;
-        fitted.is_worth_a_table(prior, files).map(|()| fitted)
-    };
-    let fitted = fitted_without(&[])?;
-    let (fitted, made) = match table::make(prior, &fitted.model, &recorded) {
-        // A table has no wind-up that falls with the load, and none that the lag outruns.
-        Err(error) if error.is_of_a_fall() => {
-            if fitted.model.of(PartName::WindUp).is_some() {
-                fitted.model.gives_way_with_the_load(prior)?;
+/// A table with the fit that it is of, beside a prior with the phase that the rows have.
+struct FittedTable<'a> {
+    prior: Prior<'a>,
+    recorded: Recorded,
+    alignment: Option<Alignment>,
+    fitted: Fitted,
+    table: MadeTable,
+}
+
+impl<'a> FittedTable<'a> {
+    /// Fits to `rows` with the load that decides the flank as it stands in `recorded`.
+    fn of(
+        logs: &Logs<'_>,
+        prior: &Prior<'a>,
+        (rows, recorded): (Rows, Recorded),
+    ) -> Result<FittedTable<'a>, CalibrationError> {
+        let prior = &Prior { least_friction_n_m: recorded.scales.friction_n_m, ..prior.clone() };
+        let alignment = prior.table.map(|table| zero::align(table, &rows, recorded.scales.friction_n_m));
+        let aligned = Prior {
+            zero_rad: alignment
+                .as_ref()
+                .filter(|found| found.told)
+                .map_or(0.0, |found| found.generator_zero_deg.to_radians()),
+            ..prior.clone()
+        };
+        let (prior, files) = (&aligned, logs.at_one_instant);
+        let fitted_without = |without: &[Without]| {
+            let fitted = fit_outside_play(files, prior, (rows.clone(), &recorded), without)?;
+            fitted.is_worth_a_table(&recorded, prior, files).map(|()| fitted)
+        };
+        let fitted = fitted_without(&[])?;
+        let (fitted, table) = match table::make(prior, &fitted.model, &recorded) {
+            // A table has no wind-up that falls with the load, none that the lag outruns, and no error beyond its
+            // limit, which a curve that has to come to zero may pass.
+            Err(error) if error.is_of_a_fall() || recorded.scales.unrecorded != 0 => {
+                const FALLS: &str = "it would fall with the load somewhere, which no spring does";
+                const LARGE: &str = "it is too large for a table with a part of the turn";
+                let (wind_up, play) = ((PartName::WindUp, FALLS), (PartName::Play, FALLS));
+                let mut tried = vec![vec![wind_up], vec![play], vec![wind_up, play]];
+                if !error.is_of_a_fall() {
+                    tried.push(Vec::new());
+                    tried.iter_mut().for_each(|without| without.push((PartName::OutputAngle, LARGE)));
+                } else if fitted.model.of(PartName::WindUp).is_some() {
+                    fitted.model.gives_way_with_the_load(prior)?;
+                }
+                let tried = tried.into_iter().filter_map(|without| {
+                    let fitted = fitted_without(&without).ok()?;
+                    table::make(prior, &fitted.model, &recorded).ok().map(|made| (fitted, made))
+                });
+                let left = |(fitted, _): &(Fitted, MadeTable)| fitted.held_out.rms_after_arcsec;
+                tried.min_by(|a, b| left(a).total_cmp(&left(b))).ok_or(error)?
             }
-            const WHY: &str = "it would fall with the load somewhere, which no spring does";
-            let (wind_up, play) = ((PartName::WindUp, WHY), (PartName::Play, WHY));
-            let tried = [vec![wind_up], vec![play], vec![wind_up, play]].into_iter().filter_map(|without| {
-                let fitted = fitted_without(&without).ok()?;
-                table::make(prior, &fitted.model, &recorded).ok().map(|made| (fitted, made))
-            });
-            let left = |(fitted, _): &(Fitted, MadeTable)| fitted.held_out.rms_after_arcsec;
-            tried.min_by(|a, b| left(a).total_cmp(&left(b))).ok_or(error)?
-        }
-        made => (fitted, made?),
-    };
-    let agreement = fitted.agreement();
-    let turned = agreement.as_ref().and_then(|agreement| {
-        together::generators_turned(agreement, &fitted.rows, (&fitted.open, &fitted.model), prior, files)
-    });
-    let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
-    let Fitted { rows, folds, model, held_out, parts, .. } = fitted;
-    let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
-    let core = ByCore::of(files, &image, &recorded);
-    let reading_delay = logs.delays.as_ref().and_then(|delays| delays.shown(logs.measured, &image, &recorded));
-    let mut readings = logs.delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
-    let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, &recorded, prior);
-    let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
-    notes.extend(said);
-    notes.extend(reading_delay.as_ref().map(|delay| delay.note(&readings, files.len())));
-    // What is known by its angle needs no guess.
-    notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
-    notes.extend(remarks(prior, &recorded, &model, play_of_a_millisecond_arcsec));
-    let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
-    let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
-    let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
-    let none = || vec![0.0; files.len()];
-    let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
-    let left_out_arcsec = held_out.rms_after_arcsec;
-    let known = Known::of(&rows.rows, &model, &delays, recorded.coarse_rad, left_out_arcsec)
-        .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
-    // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
-    // paces that were recorded.
-    let at_rest = |at: State| State { speed_rad_s: 0.0, ..at };
-    let as_fitted = |at: State| if logs.delays.is_some() { at_rest(at) } else { at };
-    let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
-    let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
-    let anywhere = anywhere(&rows, &recorded, prior);
-    let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
-    let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
-    let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
-    notes.extend(load_with_angle(&rows, &known));
-    let output_zeros = output_zeros(files, &rows, &model, known.noise);
-    let offset = |zero: &OutputZero| Reading {
-        name: "offset",
-        file: Some(zero.file.clone()),
-        value: zero.arcsec,
-        std: zero.half_width_arcsec / OF_95,
-    };
-    readings.extend(output_zeros.iter().map(offset));
-    let calibration = Calibration {
-        schema_version: 1,
-        files: files.iter().map(|file| file.file.clone()).collect(),
-        rows: rows.of,
-        rows_fitted: rows.rows.len(),
-        rows_unsettled: rows.unsettled,
-        left_out: match rows.folds {
-            FoldKind::Files => "files",
-            FoldKind::Sessions => "sessions",
-            FoldKind::Blocks => "blocks",
-        },
-        folds,
-        held_out,
-        core,
-        reading_delay,
-        play_of_a_millisecond_arcsec,
-        readings,
-        parts,
-        nodes: known.nodes(),
-        noise: known.noise,
-        half_width_arcsec,
-        half_width_as_recorded_arcsec,
-        half_width_at_another_pace_arcsec,
-        play_width_arcsec: play_width(&model, prior, &recorded),
-        alignment,
-        output_zeros,
-        zero_cost: cost(&image),
-        ratio: prior.nominal.ratio,
-        table_id: made.info.table_id.clone(),
-        image_bytes: made.image.len(),
-        projection_rms_arcsec: made.info.projection_rms_arcsec,
-        torque_n_m: image.torque_range_n_m(),
-        temperature_c: image.temperature_range_c(),
-        data_faults: files.iter().flat_map(|file| file.faults.iter().cloned()).collect(),
-        notes,
-        command: String::new(),
-    };
-    Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
+            made => (fitted, made?),
+        };
+        Ok(FittedTable { prior: aligned, recorded, alignment, fitted, table })
+    }
+
+    /// What is said of it; `said` is noted of the ratio.
+    fn calibrated(self, logs: &Logs<'_>, said: Vec<String>) -> Result<Calibrated, CalibrationError> {
+        let FittedTable { prior, recorded, alignment, fitted, table: made } = self;
+        let (prior, files) = (&prior, logs.at_one_instant);
+        let parts = fitted.judged(&recorded, prior);
+        let agreement = fitted.agreement();
+        let turned = agreement.as_ref().and_then(|agreement| {
+            together::generators_turned(agreement, &fitted.rows, (&fitted.open, &fitted.model), prior, files)
+        });
+        let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
+        let Fitted { rows, folds, model, held_out, .. } = fitted;
+        let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
+        let core = ByCore::of(files, &image, &recorded);
+        let reading_delay = logs.delays.as_ref().and_then(|delays| delays.shown(logs.measured, &image, &recorded));
+        let mut readings = logs.delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
+        let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, &recorded, prior);
+        let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
+        notes.extend(said);
+        notes.extend(reading_delay.as_ref().map(|delay| delay.note(&readings, files.len())));
+        // What is known by its angle needs no guess.
+        notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
+        notes.extend(remarks(prior, &recorded, &model, play_of_a_millisecond_arcsec));
+        let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
+        let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
+        let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
+        let none = || vec![0.0; files.len()];
+        let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
+        let left_out_arcsec = held_out.rms_after_arcsec;
+        let known = Known::of(&rows.rows, &model, &delays, recorded.coarse_rad, left_out_arcsec)
+            .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
+        // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
+        // paces that were recorded.
+        let at_rest = |at: State| State { speed_rad_s: 0.0, ..at };
+        let as_fitted = |at: State| if logs.delays.is_some() { at_rest(at) } else { at };
+        let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
+        let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
+        let anywhere = anywhere(&rows, &recorded, prior);
+        let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
+        let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
+        let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
+        notes.extend(load_with_angle(&rows, &known));
+        let output_zeros = output_zeros(files, &rows, &model, known.noise);
+        let offset = |zero: &OutputZero| Reading {
+            name: "offset",
+            file: Some(zero.file.clone()),
+            value: zero.arcsec,
+            std: zero.half_width_arcsec / OF_95,
+        };
+        readings.extend(output_zeros.iter().map(offset));
+        let calibration = Calibration {
+            schema_version: 1,
+            files: files.iter().map(|file| file.file.clone()).collect(),
+            rows: rows.of,
+            rows_fitted: rows.rows.len(),
+            rows_unsettled: rows.unsettled,
+            left_out: match rows.folds {
+                FoldKind::Files => "files",
+                FoldKind::Sessions => "sessions",
+                FoldKind::Blocks => "blocks",
+            },
+            folds: folds.all().len(),
+            held_out,
+            core,
+            reading_delay,
+            play_of_a_millisecond_arcsec,
+            readings,
+            parts,
+            nodes: known.nodes(),
+            noise: known.noise,
+            half_width_arcsec,
+            half_width_as_recorded_arcsec,
+            half_width_at_another_pace_arcsec,
+            play_width_arcsec: play_width(&model, prior, &recorded),
+            alignment,
+            output_zeros,
+            zero_cost: cost(&image),
+            ratio: prior.nominal.ratio,
+            table_id: made.info.table_id.clone(),
+            image_bytes: made.image.len(),
+            projection_rms_arcsec: made.info.projection_rms_arcsec,
+            torque_n_m: image.torque_range_n_m(),
+            temperature_c: image.temperature_range_c(),
+            data_faults: files.iter().flat_map(|file| file.faults.iter().cloned()).collect(),
+            notes,
+            command: String::new(),
+        };
+        Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
+    }
 }
 
 /// What keeps a table from being made, with what was noticed of the units and signs of the logs: before what it may be
@@ -727,13 +767,12 @@ type Without = (PartName, &'static str);
 
 struct Fitted {
     rows: Rows,
-    /// How many.
-    folds: usize,
-    /// Parts that could be chosen.
+    folds: Folds,
+    /// Parts that could be chosen, and those that were not to be.
     open: Vec<PartName>,
+    without: Vec<Without>,
     model: Model,
     held_out: HeldOut,
-    parts: Vec<PartSays>,
 }
 
 impl Fitted {
@@ -743,7 +782,12 @@ impl Fitted {
     }
 
     /// No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
-    fn is_worth_a_table(&self, prior: &Prior<'_>, files: &[Recording]) -> Result<(), CalibrationError> {
+    fn is_worth_a_table(
+        &self,
+        recorded: &Recorded,
+        prior: &Prior<'_>,
+        files: &[Recording],
+    ) -> Result<(), CalibrationError> {
         let HeldOut { rms_before_arcsec, rms_after_arcsec, .. } = self.held_out;
         let no_part = self.model.chosen.is_empty();
         if rms_after_arcsec < rms_before_arcsec && !(no_part && prior.is_empty()) {
@@ -755,8 +799,7 @@ impl Fitted {
             "what was known before is further off than the parts mend in what was left out"
         };
         let apart = self.agreement().and_then(|agreement| agreement.note(files));
-        let recorded = |file: &Recording| file.sessions.iter().all(|session| session.torque_n_m.is_some());
-        let torque = (!files.iter().all(recorded)).then(|| {
+        let torque = (!recorded.has_torque).then(|| {
             "no torque was recorded: under loads that change, record it, as the wind-up is the largest part".to_owned()
         });
         let mut text = format!(
@@ -764,8 +807,65 @@ impl Fitted {
              {rms_after_arcsec:.2} with the table)"
         );
         apart.into_iter().chain(torque).for_each(|said| text += &format!("\n  {said}"));
-        self.parts.iter().for_each(|part| text += &format!("\n  {}: {}", part.name, part.why));
+        let parts = self.judged(recorded, prior);
+        parts.iter().for_each(|part| text += &format!("\n  {}: {}", part.name, part.why));
         Err(CalibrationError::NothingGained(text))
+    }
+
+    /// Report on each part.
+    fn judged(&self, recorded: &Recorded, prior: &Prior<'_>) -> Vec<PartSays> {
+        let Fitted { rows, folds, model, .. } = self;
+        let all = folds.all();
+        let before = folds.left_out(&all, &[]);
+        let with = folds.left_out(&all, &model.chosen);
+        let says = |part: PartName| {
+            let refused = |gain: Option<f64>, why: String| PartSays {
+                name: part.as_str(),
+                kept: false,
+                held_out_gain: gain,
+                penalty: None,
+                size_arcsec: None,
+                why,
+            };
+            if let Some(why) = recorded.lacks(part, prior) {
+                return refused(None, why);
+            }
+            if let Some((_, why)) = self.without.iter().find(|(other, _)| *other == part) {
+                return refused(None, (*why).to_owned());
+            }
+            if let Some(chosen) = model.chosen.iter().find(|chosen| chosen.part == part) {
+                let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
+                let without = folds.left_out(&all, &others);
+                return PartSays {
+                    name: part.as_str(),
+                    kept: true,
+                    held_out_gain: Some((without - with) / before),
+                    penalty: Some(chosen.penalty),
+                    size_arcsec: Some(size(rows, model, *chosen)),
+                    why: format!(
+                        "it takes {:.1} % of the squares that the others leave ({:.0} % are asked for); without it the \
+                     error where nothing was fitted is {:.2} times as large",
+                        100.0 * (without - with) / without,
+                        100.0 * LEAST_GAIN,
+                        (without / with).sqrt()
+                    ),
+                };
+            }
+            let (_, left) = best_penalty(folds, &all, &model.chosen, Chosen { part, penalty: 0.0 });
+            let gain = (with - left) / before;
+            let share = (with - left) / with;
+            let why = if share > LEAST_GAIN {
+                "it gains in the rows it was chosen on, not where it was not".to_owned()
+            } else {
+                format!(
+                    "it would take {:.1} % of the squares that the others leave; {:.0} % are asked for",
+                    100.0 * share,
+                    100.0 * LEAST_GAIN
+                )
+            };
+            refused(Some(gain), why)
+        };
+        PartName::ALL.into_iter().map(says).collect()
     }
 }
 
@@ -823,70 +923,8 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
             rms_prior_arcsec: rms(folds.left_out(&all, &[])),
             rms_after_arcsec: rms(left[most]),
         };
-        let parts = judged(&rows, &folds, &model, (recorded, prior), &without);
-        return Ok(Fitted { rows, folds: all.len(), open, model, held_out, parts });
+        return Ok(Fitted { rows, folds, open, without, model, held_out });
     }
-}
-
-/// Report on each part.
-fn judged(
-    rows: &Rows,
-    folds: &Folds,
-    model: &Model,
-    (recorded, prior): (&Recorded, &Prior<'_>),
-    without: &[Without],
-) -> Vec<PartSays> {
-    let all = folds.all();
-    let before = folds.left_out(&all, &[]);
-    let with = folds.left_out(&all, &model.chosen);
-    let says = |part: PartName| {
-        let refused = |gain: Option<f64>, why: String| PartSays {
-            name: part.as_str(),
-            kept: false,
-            held_out_gain: gain,
-            penalty: None,
-            size_arcsec: None,
-            why,
-        };
-        if let Some(why) = recorded.lacks(part, prior) {
-            return refused(None, why);
-        }
-        if let Some((_, why)) = without.iter().find(|(other, _)| *other == part) {
-            return refused(None, (*why).to_owned());
-        }
-        if let Some(chosen) = model.chosen.iter().find(|chosen| chosen.part == part) {
-            let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
-            let without = folds.left_out(&all, &others);
-            return PartSays {
-                name: part.as_str(),
-                kept: true,
-                held_out_gain: Some((without - with) / before),
-                penalty: Some(chosen.penalty),
-                size_arcsec: Some(size(rows, model, *chosen)),
-                why: format!(
-                    "it takes {:.1} % of the squares that the others leave ({:.0} % are asked for); without it the \
-                     error where nothing was fitted is {:.2} times as large",
-                    100.0 * (without - with) / without,
-                    100.0 * LEAST_GAIN,
-                    (without / with).sqrt()
-                ),
-            };
-        }
-        let (_, left) = best_penalty(folds, &all, &model.chosen, Chosen { part, penalty: 0.0 });
-        let gain = (with - left) / before;
-        let share = (with - left) / with;
-        let why = if share > LEAST_GAIN {
-            "it gains in the rows it was chosen on, not where it was not".to_owned()
-        } else {
-            format!(
-                "it would take {:.1} % of the squares that the others leave; {:.0} % are asked for",
-                100.0 * share,
-                100.0 * LEAST_GAIN
-            )
-        };
-        refused(Some(gain), why)
-    };
-    PartName::ALL.into_iter().map(says).collect()
 }
 
 /// Half of peak to peak of a part over the rows, arcsec.
@@ -931,9 +969,10 @@ fn remarks(
     }
     if recorded.output_share < 1.0 && has(PartName::OutputAngle) {
         remarks.push(format!(
-            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle is the smoothest \
-             that joins its ends, and not measured",
-            100.0 * recorded.output_share
+            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle {}, and is not \
+             measured",
+            100.0 * recorded.output_share,
+            if recorded.scales.unrecorded == 0 { "joins its ends" } else { "is held at zero" }
         ));
     }
     if recorded.each_keeps_to_one_load {

@@ -4,8 +4,6 @@
 //! Every column is of the order of one, so that a penalty means the same in all parts. The weight of a column within
 //! its part rises with its order: smooth curves cost little, wrinkles much.
 
-use std::f64::consts::TAU;
-
 use flexspline_base::units::ARCSEC_PER_RAD;
 use serde::Serialize;
 
@@ -73,6 +71,8 @@ pub(super) const GENERATOR_ORDERS: u16 = 8;
 pub(super) const OUTPUT_ORDERS: u16 = 6;
 /// Waves of the curve over a tooth pitch: eight nodes of a table hold them.
 pub(super) const TOOTH_ORDERS: u16 = 3;
+/// Parts of the output's turn, each with rows or without.
+pub(super) const PARTS_OF_A_TURN: usize = 36;
 /// Degree of the wind-up over the torques recorded.
 const WIND_UP_DEGREE: usize = 6;
 /// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come
@@ -122,6 +122,8 @@ pub struct Scales {
     pub speed_rad_s: f64,
     /// Standard deviation of the delay between the two angles before anything says how large it is, s.
     pub late_s: f64,
+    /// Parts of the output's turn without rows, of [`PARTS_OF_A_TURN`], a bit each; none where half of it has rows.
+    pub unrecorded: u64,
 }
 
 impl Scales {
@@ -231,12 +233,13 @@ pub(super) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
 /// Half of an arc-minute, which the lost motion of the catalogue's drives stays below.
 const HALF_A_LOST_MOTION_ARCSEC: f64 = 30.0;
 
-/// Sine and cosine of each order.
+/// Sine and cosine of each order, each turned on from the one before.
 fn waves(angle: f64, orders: u16, to: &mut Vec<f64>) {
-    let angle = angle.rem_euclid(TAU);
-    for order in 1..=orders {
-        let (sine, cosine) = (f64::from(order) * angle).sin_cos();
-        to.extend([sine, cosine]);
+    let (sine, cosine) = angle.sin_cos();
+    let (mut s, mut c) = (sine, cosine);
+    for _ in 0..orders {
+        to.extend([s, c]);
+        (s, c) = (s * cosine + c * sine, c * cosine - s * sine);
     }
 }
 
@@ -252,6 +255,8 @@ fn chebyshev(x: f64) -> [f64; WIND_UP_DEGREE] {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     #[test]
@@ -263,6 +268,7 @@ mod tests {
             teeth: 200.0,
             speed_rad_s: 0.2,
             late_s: 1e-3,
+            unrecorded: 0,
         };
         let at = State {
             generator_rad: 1.3,

@@ -8,16 +8,15 @@
 
 use std::f64::consts::TAU;
 
-use flexspline_algebra::Mat;
 use serde::Serialize;
 
-use super::folds::Sums;
-use super::interval::{Node, Noise, OF_95, planned_covariance, row, spread, width_of, widths};
+use super::interval::{Node, Noise, OF_95, planned_covariance, row, row_of_group, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, late_s};
 use super::{
     Calibrated, CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH,
 };
+use crate::linear::Gram;
 use crate::measurement::least_and_most;
 
 /// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature.
@@ -214,8 +213,7 @@ pub struct Wide {
 /// A pass that may be made.
 struct Candidate {
     pass: Pass,
-    warmth: usize,
-    tells: Sums,
+    tells: Gram,
 }
 
 /// Plans what to record of a drive, after a first log if there is one.
@@ -236,6 +234,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         teeth: prior.tooth_pitches(),
         speed_rad_s: bench.speed_rpm / 60.0 * TAU / prior.nominal.ratio.abs(),
         late_s: late_s(1.0 / bench.rate_hz),
+        unrecorded: 0,
     };
     let ratio = prior.nominal.ratio;
     let (mut chosen, mut cannot) = open_parts(prior, bench, &scales);
@@ -246,14 +245,14 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let noise = first.map_or_else(|| bench.noise(), |first| first.known.noise);
 
     let width = width_of(&chosen);
-    let mut known = vec![Sums::new(width); warmths + files];
+    let mut known = vec![Gram::none(width + 2); warmths + files];
     for at in first.iter().flat_map(|first| &first.rows.rows) {
         let at_log = State { log: warmths + at.at.log, ..at.at };
-        known[warmths + at.at.log].add(&row(&chosen, &at_log, &scales), 0.0, 1.0);
+        known[warmths + at.at.log].add_row(&row_of_group(&chosen, &at_log, &scales, 0.0), 1.0);
     }
     let travel = bench.output_deg.map(f64::to_radians);
     let asked = Asked::of(&scales, ratio, travel, &chosen);
-    let of = |known: &[Sums]| {
+    let of = |known: &[Gram]| {
         let covariance = planned_covariance(known, &chosen, &scales, noise.of_a_row());
         covariance.ok_or(CalibrationError::Known("the information matrix is singular".to_owned()))
     };
@@ -263,11 +262,10 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let (mut left_s, mut taken) = (60.0 * bench.minutes, Vec::new());
     while taken.len() < MOST_PASSES {
         let uncertain = asked.mean_variance(&now);
-        let mut best: Option<(f64, usize, Mat)> = None;
+        let mut best: Option<(f64, usize, Vec<f64>)> = None;
         // The ends of the loads first, as a table ends where they do; then each load and temperature once before one is
         // repeated: the parts do not know all that they do.
-        let is_new =
-            |c: &Candidate, of: fn(&Pass) -> f64| taken.iter().all(|(_, pass): &(usize, Pass)| of(pass) != of(&c.pass));
+        let is_new = |c: &Candidate, of: fn(&Pass) -> f64| taken.iter().all(|pass: &Pass| of(pass) != of(&c.pass));
         let news = |c: &Candidate| {
             let new_load = is_new(c, |pass| pass.torque_n_m);
             let new = usize::from(new_load) + usize::from(is_new(c, |pass| pass.temperature_c));
@@ -277,7 +275,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         let most = candidates.iter().filter(|c| fits(c)).map(news).max();
         for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| fits(c) && Some(news(c)) == most) {
             let mut with = known.clone();
-            with[candidate.warmth].join(&candidate.tells);
+            with[candidate.pass.log - 1].add(&candidate.tells, 1.0);
             let then = of(&with)?;
             let gain = (uncertain - asked.mean_variance(&then)) / candidate.pass.duration_s;
             if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
@@ -286,9 +284,9 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         }
         let Some((_, k, then)) = best else { break };
         let tells = asked.tells_most(&chosen, &now, &then);
-        known[candidates[k].warmth].join(&candidates[k].tells);
+        known[candidates[k].pass.log - 1].add(&candidates[k].tells, 1.0);
         left_s -= candidates[k].pass.duration_s;
-        taken.push((candidates[k].warmth, Pass { tells, ..candidates[k].pass }));
+        taken.push(Pass { tells, ..candidates[k].pass });
         now = then;
     }
     if taken.len() == MOST_PASSES {
@@ -307,7 +305,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         )));
     }
     let nodes = widths(&chosen, &scales, &now, None);
-    let rms = |covariance: &Mat| asked.mean_variance(covariance).sqrt();
+    let rms = |covariance: &[f64]| asked.mean_variance(covariance).sqrt();
     let mut widest = Vec::new();
     if let Some(first) = first {
         let mut then = widths(&chosen, &scales, &at_first, None);
@@ -374,24 +372,15 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
 
 /// Cold first; at each temperature in the order in which they tell most, so that a log that is broken off is worth
 /// most.
-fn in_order(taken: Vec<(usize, Pass)>) -> Vec<Pass> {
-    let warmths = taken.iter().map(|(warmth, _)| warmth + 1).max().unwrap_or(0);
-    let mut passes = Vec::new();
-    for warmth in 0..warmths {
-        let mut begin_s = 0.0;
-        for (_, pass) in taken.iter().filter(|(of, _)| *of == warmth) {
-            passes.push(Pass { begin_s, ..*pass });
-            begin_s += pass.duration_s;
-        }
+fn in_order(mut passes: Vec<Pass>) -> Vec<Pass> {
+    passes.sort_by_key(|pass| pass.log);
+    let (mut log, mut begin_s) = (0, 0.0);
+    for pass in &mut passes {
+        begin_s = if pass.log == log { begin_s } else { 0.0 };
+        (log, pass.begin_s) = (pass.log, begin_s);
+        begin_s += pass.duration_s;
     }
     passes
-}
-
-/// The column of the temperature that moves the zero alone, which logs of one temperature each cannot tell from the
-/// encoder's.
-fn column_of_zero(chosen: &[PartName]) -> Option<usize> {
-    let at = chosen.iter().position(|part| *part == PartName::Temperature)?;
-    Some(width_of(&chosen[..at]))
 }
 
 /// Target of the plan: the mean of `x xᵀ` over all that it is to hold.
@@ -404,7 +393,9 @@ impl Asked {
     fn of(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[PartName]) -> Asked {
         let mut rows: Vec<Vec<f64>> =
             spread(scales, ratio, travel, ASKED).iter().map(|at| row(chosen, at, scales)).collect();
-        if let Some(zero) = column_of_zero(chosen) {
+        // The zero by temperature: logs of one temperature each cannot tell it from the encoder's.
+        if let Some(at) = chosen.iter().position(|part| *part == PartName::Temperature) {
+            let zero = width_of(&chosen[..at]);
             rows.iter_mut().for_each(|row| row[zero] = 0.0);
         }
         // What is the same everywhere is the encoder's zero, and nobody's error.
@@ -423,17 +414,17 @@ impl Asked {
     }
 
     /// Mean variance of some of the columns.
-    fn variance_of(&self, covariance: &Mat, columns: std::ops::Range<usize>) -> f64 {
+    fn variance_of(&self, covariance: &[f64], columns: std::ops::Range<usize>) -> f64 {
         let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
-        pairs.map(|(i, j)| self.moment[i * self.width + j] * covariance[(i, j)]).sum::<f64>().max(0.0)
+        pairs.map(|(i, j)| self.moment[i * self.width + j] * covariance[i * self.width + j]).sum::<f64>().max(0.0)
     }
 
-    fn mean_variance(&self, covariance: &Mat) -> f64 {
+    fn mean_variance(&self, covariance: &[f64]) -> f64 {
         self.variance_of(covariance, 0..self.width)
     }
 
     /// The part whose variance falls most.
-    fn tells_most(&self, chosen: &[PartName], before: &Mat, after: &Mat) -> PartName {
+    fn tells_most(&self, chosen: &[PartName], before: &[f64], after: &[f64]) -> PartName {
         let mut begin = 0;
         let mut best = (f64::NEG_INFINITY, PartName::OutputAngle);
         for one in chosen {
@@ -466,17 +457,21 @@ fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartNam
         PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
             Some("the teeth are not known, the ratio alone is".to_owned())
         }
-        PartName::OutputAngle if turns < super::HALF_A_TURN => Some(format!("the travel is {turns:.2} output turns")),
+        PartName::OutputAngle if turns < super::PERIOD_OF_THE_OUTPUT => {
+            Some(format!("the travel is {turns:.2} output turns"))
+        }
         PartName::Temperature if scales.temperature_c[1] - scales.temperature_c[0] < ONE_TEMPERATURE_K => {
             Some("one temperature: give the range, --temperatures-c LOW,HIGH".to_owned())
         }
         _ => None,
     };
-    let open = PartName::ALL.into_iter().filter(|part| lacks(*part).is_none()).collect();
-    let cannot = PartName::ALL
-        .into_iter()
-        .filter_map(|part| lacks(part).map(|why| format!("{}: {why}", part.as_str())))
-        .collect();
+    let (mut open, mut cannot) = (Vec::new(), Vec::new());
+    for part in PartName::ALL {
+        match lacks(part) {
+            Some(why) => cannot.push(format!("{}: {why}", part.as_str())),
+            None => open.push(part),
+        }
+    }
     (open, cannot)
 }
 
@@ -550,7 +545,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                 let duration_s = moving_s + 2.0 * REST_S;
                 let speed_rad_s = speed_rpm / 60.0 * TAU / ratio.abs();
                 let weight = moving_s * bench.rate_fitted_hz() / ROWS_OF_A_PASS as f64;
-                let mut tells = Sums::new(width_of(chosen));
+                let mut tells = Gram::none(width_of(chosen) + 2);
                 for k in 0..ROWS_OF_A_PASS {
                     let way = if k % 2 == 0 { 1.0 } else { -1.0 };
                     let share = (k as f64 + 0.5) / ROWS_OF_A_PASS as f64;
@@ -567,7 +562,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                         speed_rad_s: way * speed_rad_s,
                         log: warmth,
                     };
-                    tells.add(&row(chosen, &at, scales), 0.0, weight);
+                    tells.add_row(&row_of_group(chosen, &at, scales, 0.0), weight);
                 }
                 let pass = Pass {
                     log: warmth + 1,
@@ -582,7 +577,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                     temperature_c,
                     tells: PartName::OutputAngle,
                 };
-                all.push(Candidate { pass, warmth, tells });
+                all.push(Candidate { pass, tells });
             }
         }
     }

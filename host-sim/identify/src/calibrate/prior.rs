@@ -9,7 +9,7 @@ use super::parts::State;
 use super::zero::steady;
 use crate::extension::Model;
 use crate::nominal::{Nominal, Spread};
-use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::drive::{DriveError, GeneratorKind};
 
 /// Temperature of a drive that is known by its ratio alone, °C.
 const USUAL_TEMPERATURE_C: f64 = 20.0;
@@ -34,6 +34,25 @@ pub struct Prior<'a> {
 }
 
 impl<'a> Prior<'a> {
+    /// A drive known by a nominal model, called `drive`; the hash is that of the name.
+    #[must_use]
+    pub fn of_nominal(nominal: Nominal, drive: &str, kind: GeneratorKind) -> Prior<'a> {
+        let hash = *blake3::hash(drive.as_bytes()).as_bytes();
+        let drive = drive.to_owned();
+        Prior { nominal, table: None, drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
+    }
+
+    /// A drive known by a file, `nominal.toml` or `drive-extended.toml`, with the model that stands there.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn of_file(path: &Path, kind: GeneratorKind) -> Result<(Prior<'a>, Model), DriveError> {
+        let model = Model::read(path)?;
+        let hash = *blake3::hash(&std::fs::read(path).unwrap_or_default()).as_bytes();
+        let known = Prior::of_nominal(model.nominal.clone(), &path.display().to_string(), kind);
+        Ok((Prior { hash, ..known }, model))
+    }
+
     /// A drive known by its ratio alone: no wind-up, no play, no waves.
     #[must_use]
     pub fn of_ratio(ratio: f64, kind: GeneratorKind) -> Prior<'a> {
@@ -50,9 +69,7 @@ impl<'a> Prior<'a> {
             spread: none,
             kernels: None,
         };
-        let drive = format!("ratio {ratio}");
-        let hash = *blake3::hash(drive.as_bytes()).as_bytes();
-        Prior { nominal, table: None, drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
+        Prior::of_nominal(nominal, &format!("ratio {ratio}"), kind)
     }
 
     /// The same of a ratio that somebody gives.
@@ -66,31 +83,12 @@ impl<'a> Prior<'a> {
         Err(CalibrationError::Known(format!("--ratio: found {ratio}, allowed: 2 to 10000, or negative")))
     }
 
-    /// A drive known by the file of its nominal model.
-    ///
-    /// # Errors
-    /// It cannot be read, or holds causes.
-    pub fn of_model(path: &Path, kind: GeneratorKind) -> Result<Prior<'a>, CalibrationError> {
-        let model = Model::read(path).map_err(|error| CalibrationError::Known(error.to_string()))?;
-        let refused = |what: String| CalibrationError::Known(format!("{}: {what}", path.display()));
-        if !model.causes.is_empty() {
-            let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is fitted \
-                        here anew";
-            return Err(refused(what.to_owned()));
-        }
-        let bytes = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
-        let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
-        let known = Prior::of_ratio(model.nominal.ratio, kind);
-        Ok(Prior { nominal: model.nominal, drive, hash, ..known })
-    }
-
     /// A drive known by a table.
     #[must_use]
     pub fn of_table(table: &'a Table<'a>, kind: GeneratorKind) -> Prior<'a> {
         let hash = *blake3::hash(table.image()).as_bytes();
         let drive = format!("table {}", table.id());
-        let nominal = Nominal::of_table(table);
-        Prior { nominal, table: Some(table), drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
+        Prior { table: Some(table), hash, ..Prior::of_nominal(Nominal::of_table(table), &drive, kind) }
     }
 
     /// Whether nothing but the ratio is known.
@@ -111,16 +109,7 @@ impl<'a> Prior<'a> {
         if let Some(table) = self.table {
             return Ok(*table.drive());
         }
-        let drive = self.nominal.teeth_or_of_two_waves().core_drive();
-        let drive = drive.map_err(|error| CalibrationError::Known(format!("ratio {}: {error}", self.nominal.ratio)))?;
-        if (drive.exact_ratio() / self.nominal.ratio - 1.0).abs() > 1e-9 {
-            return Err(CalibrationError::Known(format!(
-                "ratio: found {}, allowed: a ratio that wheels with two teeth of difference have, a whole number or a \
-                 half; or a model with the teeth, --model nominal.toml",
-                self.nominal.ratio
-            )));
-        }
-        Ok(drive)
+        self.nominal.core_drive().map_err(|error| CalibrationError::Known(error.to_string()))
     }
 
     /// Tooth pitches of the fixed wheel in a turn of the generator.

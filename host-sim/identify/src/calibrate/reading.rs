@@ -4,12 +4,13 @@ use serde::Serialize;
 
 use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
 use super::folds::{Chosen, Row};
-use super::interval::{Known, OF_95};
+use super::interval::{Known, OF_95, left_by};
 use super::parts::{PartName, Scales, expected_arcsec};
-use super::rows::{Recorded, Rows, settled, speed_rad_s};
+use super::rows::{Recorded, Rows, settled, speeds_rad_s};
 use super::{Model, Prior};
 use crate::extension::left_by_core;
-use crate::measurement::Recording;
+use crate::measurement::{Recording, Session};
+use crate::turns_off::about_mean;
 use flexspline::Table;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -100,7 +101,8 @@ impl Delays {
         let none = vec![0.0; logs];
         let known = |model: &Model| Known::of(&rows.rows, model, &none, recorded.coarse_rad, 0.0);
         // Of noise as large as the delays make it they would be held back.
-        let of_a_row = known(&model(&chosen)?)?.noise.of_a_row() / rows.rows.len() as f64;
+        let (_, noise) = left_by(&rows.rows, &model(&chosen)?, logs, recorded.coarse_rad);
+        let of_a_row = noise.of_a_row() / rows.rows.len() as f64;
         for chosen in &mut chosen {
             if matches!(chosen.part, PartName::Play | PartName::ReadingDelay(_)) {
                 chosen.penalty = of_a_row / expected_arcsec(chosen.part, &scales, &[]).powi(2);
@@ -145,7 +147,7 @@ impl Delays {
         for (file, delay) in files.iter_mut().zip(&self.0) {
             let by_s = delay.map_or(0.0, |[by_s, _]| by_s);
             for session in &mut file.sessions {
-                let speeds: Vec<f64> = (0..session.len()).map(|k| speed_rad_s(session, k, ratio)).collect();
+                let speeds = speeds_rad_s(session, ratio);
                 session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += by_s * speed);
             }
         }
@@ -230,20 +232,13 @@ pub struct ByCore {
 impl ByCore {
     pub(super) fn of(files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> ByCore {
         let (mut before, mut after, mut rows) = (0.0, 0.0, 0);
+        let squares = |values: Vec<f64>| about_mean(&values).powi(2) * values.len() as f64;
         for file in files {
-            let about = |values: Vec<f64>| {
-                let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-                values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
-            };
-            let measured: Vec<f64> = file
-                .sessions
-                .iter()
-                .flat_map(|session| session.error_rad.iter().map(|rad| rad * ARCSEC_PER_RAD))
-                .collect();
+            let errors = file.sessions.iter().flat_map(|session| &session.error_rad);
             let left = file.sessions.iter().flat_map(|session| left_by_core(table, session, recorded.temperature_c));
-            rows += measured.len();
-            before += about(measured);
-            after += about(left.collect());
+            rows += file.sessions.iter().map(Session::len).sum::<usize>();
+            before += squares(errors.map(|rad| rad * ARCSEC_PER_RAD).collect());
+            after += squares(left.collect());
         }
         let rms = |squares: f64| (squares / rows.max(1) as f64).sqrt();
         ByCore { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after), rows }

@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::folds::{Folds, Row};
-use super::parts::{PartName, Scales, State};
+use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State};
 use super::prior::Prior;
 use crate::least_squares::Normal;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -98,24 +98,20 @@ impl Recorded {
         let usual = prior.nominal.temperature_c;
         let angles = |scale: f64| sessions().flat_map(move |s| s.generator_rad.iter().map(move |psi| psi * scale));
         let generator = least_and_most(angles(1.0));
-        let mut steps: Vec<f64> =
-            sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs())).collect();
-        steps = sampled(&steps);
-        let step_rad = quantile_of(&mut steps, 0.9);
+        let steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| p[1] - p[0]));
+        let steps: Vec<f64> = steps.map(|step| step * prior.nominal.ratio.signum()).collect();
+        let mut sizes = sampled(&steps);
+        sizes.iter_mut().for_each(|step| *step = step.abs());
+        let step_rad = quantile_of(&mut sizes, 0.9);
         // By the way and not by rows: one direction may be driven at another pace.
-        let (mut moved, mut backward) = (0.0_f64, 0.0);
-        for pair in sessions().flat_map(|s| s.generator_rad.windows(2)) {
-            let step = (pair[1] - pair[0]) * prior.nominal.ratio.signum();
-            moved += step.abs();
-            backward += (-step).max(0.0);
-        }
+        let way = |of: &dyn Fn(&f64) -> bool| steps.iter().filter(|step| of(step)).map(|step| step.abs()).sum::<f64>();
+        let (moved, backward) = (way(&|_| true), way(&|step| *step < 0.0));
         let fine_rad = TAU / (super::ROWS_OF_A_PITCH * prior.tooth_pitches());
-        let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
-        let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
+        let fine_turns = way(&|step| step.abs() <= fine_rad * (1.0 + 1e-3)) / TAU;
         let most = torque.0.abs().max(torque.1.abs());
         let speeds: Vec<f64> = sessions()
-            .flat_map(|session| (0..session.len()).map(|k| speed_rad_s(session, k, prior.nominal.ratio)))
-            .filter(|speed| speed.abs() > 0.0)
+            .flat_map(|session| speeds_rad_s(session, prior.nominal.ratio))
+            .filter(|s| s.abs() > 0.0)
             .collect();
         let speeds = sampled(&speeds);
         let paces = |of: &dyn Fn(f64) -> f64| {
@@ -135,6 +131,8 @@ impl Recorded {
             let (low, high) = least_and_most(loads);
             high - low < super::LEAST_FRICTION * most
         };
+        let unrecorded = without_rows(angles(1.0 / prior.nominal.ratio), PARTS_OF_A_TURN);
+        let output_share = share_with_rows(unrecorded, PARTS_OF_A_TURN);
         let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
             torque_noise_n_m,
@@ -145,14 +143,15 @@ impl Recorded {
                 teeth: prior.tooth_pitches(),
                 speed_rad_s: fast,
                 late_s: late_s(period_s),
+                unrecorded: if output_share < super::HALF_A_TURN { unrecorded } else { 0 },
             },
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             one_pace,
             has_torque,
             each_keeps_to_one_load: has_torque && files.len() > 1 && files.iter().all(keeps_to_one_load),
             has_temperature,
-            generator_share: covered(angles(1.0), 24),
-            output_share: covered(angles(1.0 / prior.nominal.ratio), 36),
+            generator_share: share_with_rows(without_rows(angles(1.0), 24), 24),
+            output_share,
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
             step_rad,
@@ -203,7 +202,7 @@ impl Recorded {
             PartName::ToothPitch if self.fine_turns < super::FINE_TURNS => {
                 Some(format!("rows are {:.2} tooth pitches apart", self.step_rad * self.scales.teeth / TAU))
             }
-            PartName::OutputAngle if self.output_share < super::HALF_A_TURN => {
+            PartName::OutputAngle if self.output_share < super::PERIOD_OF_THE_OUTPUT => {
                 Some(format!("{:.0} % of an output turn was recorded", 100.0 * self.output_share))
             }
             PartName::Temperature if !self.has_temperature => Some("no temperature was recorded".to_owned()),
@@ -215,19 +214,23 @@ impl Recorded {
     }
 }
 
-/// Speed of the output at a row, rad/s; 0 where no time says it.
-pub(super) fn speed_rad_s(session: &Session, row: usize, ratio: f64) -> f64 {
-    let (from, to) = (row.saturating_sub(1), (row + 1).min(session.len() - 1));
-    let Some(time) = &session.time_s else { return 0.0 };
-    let span = time[to] - time[from];
-    if span > 0.0 { (session.generator_rad[to] - session.generator_rad[from]) / span / ratio } else { 0.0 }
+/// Speed of the output in each row, rad/s; 0 where no time says it.
+pub(super) fn speeds_rad_s(session: &Session, ratio: f64) -> Vec<f64> {
+    let Some(time) = &session.time_s else { return vec![0.0; session.len()] };
+    let mut speeds = rates(std::slice::from_ref(&(0..session.len())), time, &session.generator_rad);
+    speeds.iter_mut().for_each(|speed| *speed /= ratio);
+    speeds
 }
 
-/// Share of a turn with angles in it.
-fn covered(angles: impl Iterator<Item = f64>, parts: usize) -> f64 {
-    let mut there = vec![false; parts];
-    angles.for_each(|angle| there[((angle / TAU).rem_euclid(1.0) * parts as f64) as usize % parts] = true);
-    there.iter().filter(|there| **there).count() as f64 / parts as f64
+/// Which of the `parts` of a turn have no angles in them, a bit each.
+fn without_rows(angles: impl Iterator<Item = f64>, parts: usize) -> u64 {
+    let part = |angle: f64| (angle.rem_euclid(TAU) / TAU * parts as f64) as usize % parts;
+    angles.fold((1 << parts) - 1, |without, angle| without & !(1 << part(angle)))
+}
+
+/// Share of the `parts` of a turn that have rows.
+fn share_with_rows(without: u64, parts: usize) -> f64 {
+    (parts - without.count_ones() as usize) as f64 / parts as f64
 }
 
 /// Of how many rows one is fitted, of a record of `total`. No whole number: such rows may all lie at the same few
@@ -262,6 +265,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                 recorded.step_rad,
                 SETTLED * play_rad * prior.nominal.ratio.abs(),
             );
+            let speeds = speeds_rad_s(session, prior.nominal.ratio);
             let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
             for k in thinned {
                 let Some(way) = ways[k] else {
@@ -276,7 +280,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     torque_n_m: if recorded.has_torque { at(&session.torque_n_m, 0.0) } else { 0.0 },
                     temperature_c: at(&session.temperature_c, recorded.temperature_c),
                     way,
-                    speed_rad_s: speed_rad_s(session, k, prior.nominal.ratio),
+                    speed_rad_s: speeds[k],
                     log: zero,
                 };
                 let measured_arcsec = session.error_rad[k] * ARCSEC_PER_RAD;
@@ -393,28 +397,11 @@ impl Rows {
 
 /// Direction of the output in each row; `None` before the first motion and until the play is through after a reversal.
 fn directions(session: &Session, ratio: f64, step_rad: f64, settle_rad: f64) -> Vec<Option<f64>> {
-    let back = TURNED_ROUND * step_rad;
-    let Some(first) = session.generator_rad.first() else { return Vec::new() };
-    let (mut way, mut extreme, mut turned_at) = (0.0_f64, *first, *first);
-    session
-        .generator_rad
-        .iter()
-        .map(|psi| {
-            let beyond = (psi - extreme) * if way == 0.0 { 1.0 } else { way };
-            if way == 0.0 {
-                if beyond.abs() > back {
-                    way = beyond.signum();
-                    extreme = *psi;
-                }
-            } else if beyond > 0.0 {
-                extreme = *psi;
-            } else if -beyond > back {
-                (way, turned_at, extreme) = (-way, extreme, *psi);
-            }
-            let through = way != 0.0 && (psi - turned_at).abs() >= settle_rad;
-            through.then_some(way * ratio.signum())
-        })
-        .collect()
+    let turns = turns(&session.generator_rad, TURNED_ROUND * step_rad);
+    let settled = |(psi, (way, turned_at)): (&f64, (f64, f64))| {
+        (way != 0.0 && (psi - turned_at).abs() >= settle_rad).then_some(way * ratio.signum())
+    };
+    session.generator_rad.iter().zip(turns).map(settled).collect()
 }
 
 #[cfg(test)]

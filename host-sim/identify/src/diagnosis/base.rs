@@ -10,12 +10,13 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use flexspline::{GeneratorAngle, PlayState, Table};
+use flexspline::Table;
 
 use super::flank_lag::{behind, flank_lag};
-use super::linear::{Gram, Prior, solve};
 use super::rows::{Rows, combined, rms};
+use crate::linear::{Gram, Prior, solve};
 use crate::nominal::Nominal;
+use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// How the flank changes where the torque is below friction.
@@ -302,11 +303,9 @@ fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
 pub(super) fn predicted_by_table(rows: &Rows, torque: &[f64], table: &Table<'_>) -> Vec<f64> {
     let mut predicted = vec![0.0; rows.len()];
     for session in &rows.sessions {
-        let mut play = PlayState::unknown();
-        for k in session.clone() {
-            let generator = GeneratorAngle::from_rad(rows.generator[k]).unwrap_or(GeneratorAngle::ZERO);
-            let said = table.forward(&mut play, generator, torque[k] as f32, rows.temperature[k] as f32);
-            predicted[k] = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
+        let states = session.clone().map(|k| [rows.generator[k], torque[k], rows.temperature[k]]);
+        for (predicted, said) in predicted[session.clone()].iter_mut().zip(by_core(table, states)) {
+            *predicted = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
         }
     }
     predicted

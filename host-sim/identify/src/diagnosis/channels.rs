@@ -346,30 +346,6 @@ pub(crate) fn check_degrees(
     Err(MeasuredError::of_file(&recording.file, &why))
 }
 
-/// A ratio that the data turn by, and the whole one that it may be meant to be.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct RatioProposal {
-    /// Generator turns for one of the output, as the data have them.
-    pub found: f64,
-    /// The nearest whole ratio.
-    pub proposed: f64,
-}
-
-/// A whole ratio is proposed where the one found is this near… *Guess*: ratios of gears with whole teeth and two waves
-/// are whole or halves.
-const NEAR_WHOLE: f64 = 0.2;
-/// …and the one given is off by at least this share. *Guess*: a fifth of a turn at a ratio of 100, as [`NEAR_WHOLE`].
-const OFF: f64 = 2e-3;
-
-/// What the ratio may be meant to be, where it is off by `relative_error` (of the nominal output angle).
-#[must_use]
-pub(crate) fn proposed_ratio(nominal_ratio: f64, relative_error: f64) -> Option<RatioProposal> {
-    let found = nominal_ratio / (1.0 + relative_error);
-    let proposed = found.round();
-    let other = proposed != nominal_ratio.round() && relative_error.abs() > OFF;
-    (other && (found - proposed).abs() < NEAR_WHOLE).then_some(RatioProposal { found, proposed })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -506,15 +482,5 @@ mod tests {
         for factor in [60.0, 95.0, 0.01] {
             assert_eq!(check(&recording(&nominal, |_, load| load / factor), &map), Ok(()), "{factor}");
         }
-    }
-
-    #[test]
-    fn a_whole_ratio_is_proposed_near_the_one_found() {
-        let near = |nominal: f64, data: f64| proposed_ratio(nominal, nominal / data - 1.0).map(|p| p.proposed);
-        assert_eq!(near(100.0, 101.0), Some(101.0));
-        assert_eq!(near(95.0, 100.03), Some(100.0));
-        assert_eq!(near(-100.0, -101.05), Some(-101.0));
-        assert_eq!(near(100.0, 100.02), None);
-        assert_eq!(near(100.0, 100.5), None);
     }
 }

@@ -206,10 +206,7 @@ fn least_apart(
         let best = scaffold
             .begin(law)
             .into_iter()
-            .filter_map(|places| {
-                let trial = Term::bare(&problem, law, places.clone());
-                Some((scaffold.fit(Some(&trial))?.solution.misfit, places))
-            })
+            .filter_map(|places| Some((scaffold.trial(law, &places, false)?.misfit, places)))
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         let (_, fit) = scaffold.refine(Term::new(&problem, law, best.1))?;
         least = least.min((fit.solution.misfit - own).max(0.0).sqrt());

@@ -12,12 +12,12 @@ use super::candidate::{Acting, Excitation, Law, LawUnits, Regressor, Tag, Tolera
 use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
-use super::resolution::{Resolution, averages_hide, resolution};
+use super::resolution::averages_hide;
 use super::rows::{Rows, add_scaled};
 use super::select::{Selected, fixed, less, settle_all};
 use super::thinned::{Sample, Thinned};
 use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
-use crate::causes::CauseName;
+use crate::causes::{CauseName, ParameterName};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 
@@ -38,6 +38,11 @@ impl FittedCause {
     #[must_use]
     pub fn name(&self) -> CauseName {
         self.name
+    }
+
+    /// Whether it is the encoder of the output that reads wrong.
+    pub(crate) fn at_output(&self) -> bool {
+        self.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0)
     }
 }
 
@@ -82,6 +87,18 @@ pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nomina
         }
     }
     Some(rows.sessions.iter().map(|session| added[session.clone()].to_vec()).collect())
+}
+
+/// What a nominal model, or a table in its place, predicts for each session, arcsec, with the play as it was `found`.
+pub(crate) fn nominal_arcsec(
+    sessions: &[Session],
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+    found: Option<&Extended>,
+) -> Vec<Vec<f64>> {
+    let rows = Rows::new(sessions, nominal);
+    let base = Base::with_play(&rows, nominal, table, found.map_or(PlayLaw::Held, |found| found.play));
+    rows.sessions.iter().map(|session| base.prediction[session.clone()].to_vec()).collect()
 }
 
 impl FittedLaw {
@@ -166,31 +183,10 @@ impl Series {
     }
 }
 
-/// How finely rows are to be looked at, and the noise in them.
-fn fineness(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], averages: usize) -> Fineness {
-    let Resolution { stride, fast } = resolution(on, laws, uncertain, averages, &[]);
-    let free = prepare::FreeColumns::of(on, laws);
-    let (noise, worth) = prepare::noise(on, &free, &fast, uncertain, None);
-    Fineness { stride, noise, worth }
-}
-
 impl Extended {
-    /// Fits the nominal model and the named causes to sessions. A name that these data cannot speak about (a load
-    /// without torque, a law of teeth without teeth) is left out.
-    ///
-    /// # Errors
-    /// As [`super::diagnose`].
-    pub fn fit(
-        sessions: &[Session],
-        nominal: &Nominal,
-        table: Option<&Table<'_>>,
-        causes: &[CauseName],
-        settings: &Settings,
-    ) -> Result<Extended, DiagnosisError> {
-        Extended::fit_to(sessions, &vec![true; sessions.len()], nominal, table, causes, settings)
-    }
-
-    /// Fits to the sessions that are `used`; of the others only the history counts (time, travel under load).
+    /// Fits the nominal model and the named causes to the sessions that are `used`; of the others only the history
+    /// counts (time, travel under load). A name that these data cannot speak about (a load without torque, a law of
+    /// teeth without teeth) is left out.
     ///
     /// # Errors
     /// As [`super::diagnose`].
@@ -200,7 +196,7 @@ impl Extended {
         nominal: &Nominal,
         table: Option<&Table<'_>>,
         causes: &[CauseName],
-        settings: &Settings,
+        (settings, fineness): (&Settings, Fineness),
     ) -> Result<Extended, DiagnosisError> {
         let rows = Rows::new(sessions, nominal).learning_from(used);
         super::check(&rows)?;
@@ -209,8 +205,7 @@ impl Extended {
         let on = Excitation::new(&rows, nominal, &base, &scales);
         let laws = library(&on);
         let uncertain = prepare::uncertain(&on, &[], &[]);
-        let Fineness { mut stride, noise, worth } =
-            settings.fineness.unwrap_or_else(|| fineness(&on, &laws, &uncertain, settings.averages));
+        let Fineness { mut stride, noise, worth } = fineness;
         if averages_hide(&on, &laws, causes, &uncertain, stride) {
             stride = 1;
         }

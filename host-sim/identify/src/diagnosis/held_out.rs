@@ -12,6 +12,8 @@ pub(crate) struct Evaluated {
     pub total: HeldOut,
     /// Share of the squared error before that each term removes.
     pub gains: Vec<f64>,
+    /// Share of the rms that the others leave that each term takes.
+    pub gains_beside: Vec<f64>,
 }
 
 /// Leaves out one session after another.
@@ -21,14 +23,16 @@ pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
     let square = |terms: &[&Term<'_>], linearised: bool| left_out(problem, terms, linearised, zero).unwrap_or(f64::NAN);
     let before = square(&[], false);
     let after = if terms.is_empty() { before } else { square(terms, true) };
-    let gains = (0..terms.len())
-        .map(|k| {
-            let others: Vec<&Term<'_>> = terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| *t).collect();
-            (square(&others, false) - after) / before.max(1e-12)
-        })
-        .collect();
+    let without = |k: usize| {
+        let others: Vec<&Term<'_>> = terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| *t).collect();
+        square(&others, false)
+    };
+    let without: Vec<f64> = (0..terms.len()).map(without).collect();
+    let gains = without.iter().map(|without| (without - after) / before.max(1e-12)).collect();
+    let gains_beside = without.iter().map(|without| 1.0 - (after / without.max(1e-12)).sqrt()).collect();
     let rms = |square: f64| if square.is_finite() { square.sqrt() } else { 0.0 };
-    Evaluated { total: HeldOut { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after) }, gains }
+    let total = HeldOut { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after) };
+    Evaluated { total, gains, gains_beside }
 }
 
 /// Whether the bench sets the zero of a session, which is then found in the session itself: a model with these terms

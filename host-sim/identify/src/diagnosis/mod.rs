@@ -23,7 +23,6 @@ mod extended;
 mod flank_lag;
 mod hanging;
 mod held_out;
-pub(crate) mod linear;
 pub(crate) mod model;
 pub(crate) mod noise;
 pub mod pipeline;
@@ -57,12 +56,13 @@ use crate::measurement::Session;
 use crate::nominal::Nominal;
 use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
 pub use explain::Explanation;
+pub(crate) use extended::nominal_arcsec;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
 use model::{Problem, Term, terms_at};
 use noise::{Noise, Whitener};
 pub use pipeline::{
-    Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, parse_rows,
-    read_rows,
+    Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, WrittenTable, diagnose_rows,
+    parse_rows, read_rows,
 };
 use prepare::FreeColumns;
 pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
@@ -118,8 +118,6 @@ pub struct Settings {
     pub asked: Option<CauseName>,
     /// Causes that are not considered: somebody knows that they are not there, or wants to see what the rows say then.
     pub without: CauseSet,
-    /// How finely rows are looked at, and their noise, where that is known from before.
-    pub fineness: Option<Fineness>,
 }
 
 /// How finely rows are looked at, and the noise in them.
@@ -135,14 +133,7 @@ pub struct Fineness {
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings {
-            pitch_radius_mm: 48.7,
-            averages: 12_000,
-            verbose: false,
-            asked: None,
-            without: CauseSet::default(),
-            fineness: None,
-        }
+        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, without: CauseSet::default() }
     }
 }
 
@@ -192,7 +183,7 @@ pub(crate) fn diagnose_extended(
     let Search { laws, problem, noise, stride, thinned, start, bests, fast, trace } = search;
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
-    let start = remembered(&laws, &selected.terms);
+    let mut start = remembered(&laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
     let hidden_lines: Vec<Label> = fast.iter().map(|(label, _)| *label).collect();
@@ -213,6 +204,8 @@ pub(crate) fn diagnose_extended(
     let mut diagnosis =
         verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, &hidden_lines, noise, settings, trace);
     diagnosis.set_aside = prepare::too_few_left(&problem, diagnosis.finding);
+    let is_named = |cause: CauseName| diagnosis.causes.iter().any(|named| named.name == cause);
+    start.retain(|(law, _)| laws[*law].cause().is_none_or(is_named));
     let extended = Extended::of(&problem, laws, &start, fineness).ok_or(DiagnosisError::NotFinite)?;
     Ok((diagnosis, extended))
 }

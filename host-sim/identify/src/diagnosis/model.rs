@@ -10,10 +10,10 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::candidate::{Acting, Among, Coefficients, Excitation, Law, Regressor, Tag, Tolerance, left_by};
-use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::products::{Products, Set};
 use super::rows::{combined, rms};
+use crate::linear::{Gram, Prior, Solution, products, solve};
 
 /// Data and nominal model, averaged and white.
 pub(crate) struct Problem<'a> {
@@ -226,12 +226,6 @@ impl<'l> Term<'l> {
     #[must_use]
     pub fn new(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
         Term::among(problem, law, places, None, Extent::Whole)
-    }
-
-    /// Evaluates the main columns of a law by itself.
-    #[must_use]
-    pub(crate) fn bare(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
-        Term::among(problem, law, places, None, Extent::Bare)
     }
 
     /// Only its main columns.
@@ -495,18 +489,11 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         }
     }
 
-    /// The solution with a law tried at some places: with its main columns alone, or where they mean nothing by
-    /// themselves all of them.
+    /// The solution with a law tried at some places: with all its columns where it is `whole`, else with the main ones.
     #[must_use]
-    pub(crate) fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
-        let extent = if law.search.whole { Extent::Whole } else { Extent::Bare };
+    pub(crate) fn trial(&self, law: &Law, places: &[f64], whole: bool) -> Option<Solution> {
+        let extent = if whole { Extent::Whole } else { Extent::Bare };
         Some(self.fit_with(Some(&self.white(law, extent, places)), None)?.solution)
-    }
-
-    /// The solution with all columns of a law at some places.
-    #[must_use]
-    pub(crate) fn whole_trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
-        Some(self.fit_with(Some(&self.white(law, Extent::Whole, places)), None)?.solution)
     }
 
     /// Whether a law changes what some of the terms do, and they do not change it.

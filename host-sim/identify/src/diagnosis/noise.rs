@@ -30,9 +30,9 @@ impl Noise {
 #[derive(Clone, Debug)]
 pub(crate) struct Whitener {
     /// Averages: rows of each, none across sessions.
-    groups: Vec<std::ops::Range<usize>>,
+    pub groups: Vec<std::ops::Range<usize>>,
     /// Rows to an average; fewer at the end of a session.
-    stride: usize,
+    pub stride: usize,
     /// Averages of each session.
     pub sessions: Vec<std::ops::Range<usize>>,
     /// The filter at each average.
@@ -96,12 +96,6 @@ impl Whitener {
         Whitener { groups, stride: stride.max(1), sessions, filter }
     }
 
-    /// Rows to an average.
-    #[must_use]
-    pub(crate) fn stride(&self) -> usize {
-        self.stride
-    }
-
     /// Averages of `stride` rows under noise that is white alone, `white` arcsec in a row.
     #[must_use]
     pub fn plain(rows: &Rows, uncertain: &[bool], stride: usize, white: f64) -> Whitener {
@@ -132,14 +126,7 @@ impl Whitener {
         let mut means = Vec::with_capacity(self.groups.len());
         for session in self.sessions.iter().filter(|session| !session.is_empty()) {
             let rows = &column[self.groups[session.start].start..self.groups[session.end - 1].end];
-            // The usual strides with a length that the compiler knows.
-            match self.stride {
-                1 => means.extend_from_slice(rows),
-                2 => means_of::<2>(rows, &mut means),
-                3 => means_of::<3>(rows, &mut means),
-                4 => means_of::<4>(rows, &mut means),
-                stride => means.extend(rows.chunks(stride).map(mean)),
-            }
+            means.extend(rows.chunks(self.stride).map(mean));
         }
         means
     }
@@ -169,14 +156,7 @@ impl Whitener {
     /// Innovations of averaged values, in units of their standard deviation.
     #[must_use]
     pub(crate) fn whiten_averaged(&self, averaged: &[f64]) -> Vec<f64> {
-        // Each session begins anew: nothing is kept past its last average.
-        let mut expected = 0.0;
-        let mut white = vec![0.0; averaged.len()];
-        for ((white, value), step) in white.iter_mut().zip(averaged).zip(&self.filter) {
-            *white = (value - expected) * step.worth;
-            expected = step.keep * expected + step.take * value;
-        }
-        white
+        self.whiten_abreast(&[averaged]).pop().unwrap_or_default()
     }
 
     /// Innovations of several columns of averaged values. Each value waits for the one before it, so columns go side by
@@ -186,12 +166,14 @@ impl Whitener {
         averaged.chunks(ABREAST).flat_map(|columns| self.whiten_abreast(columns)).collect()
     }
 
-    fn whiten_abreast(&self, averaged: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    fn whiten_abreast(&self, averaged: &[impl AsRef<[f64]>]) -> Vec<Vec<f64>> {
         let count = self.filter.len();
         // Fewer than there are places: the first one stands in, and is dropped.
-        let from: [&[f64]; ABREAST] = std::array::from_fn(|j| &averaged.get(j).unwrap_or(&averaged[0])[..count]);
+        let from: [&[f64]; ABREAST] =
+            std::array::from_fn(|j| &averaged.get(j).unwrap_or(&averaged[0]).as_ref()[..count]);
         let mut white: [Vec<f64>; ABREAST] =
             std::array::from_fn(|j| if j < averaged.len() { vec![0.0; count] } else { Vec::new() });
+        // Each session begins anew: nothing is kept past its last average.
         let mut expected = [0.0; ABREAST];
         for (g, step) in self.filter.iter().enumerate() {
             for j in 0..ABREAST {
@@ -230,15 +212,6 @@ impl Whitener {
     #[must_use]
     pub(crate) fn log_scale(&self) -> f64 {
         self.filter.iter().map(|step| step.scale.ln()).sum()
-    }
-}
-
-/// Means of `N` values each; the last ones may be fewer.
-fn means_of<const N: usize>(values: &[f64], means: &mut Vec<f64>) {
-    let (whole, rest) = values.as_chunks::<N>();
-    means.extend(whole.iter().map(|part| mean(part)));
-    if !rest.is_empty() {
-        means.push(mean(rest));
     }
 }
 

@@ -18,22 +18,23 @@ use flexspline::{ImageError, Table};
 use serde::Serialize;
 use thiserror::Error;
 
-use super::report::{Cause, Compensation, Diagnosis};
+use super::report::{Cause, Diagnosis};
 use super::{CauseSet, DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
 use super::{channels, quieted, torque_zero, zeros};
-use crate::causes::CauseName;
+use crate::calibrate::{CalibrationError, Prior, check_ratio_of, table_of};
+use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
-    CauseEntry, Evaluation, EvaluationError, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError,
-    TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry,
+    CauseEntry, Evaluation, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError, TableKind,
+    TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry, less,
 };
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, parse,
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, least_and_most,
+    parse,
 };
-use crate::nominal::Nominal;
+use crate::nominal::{NoSuchWheels, Nominal};
 use crate::synthesize::{EffectError, Sizes};
-use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
-use flexspline_design::tables::MadeTable;
+use flexspline_design::tables::{MadeTable, TableError, c_header, rust_source};
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
@@ -101,23 +102,35 @@ pub enum PipelineError {
     /// No table was made by FEM.
     #[error(transparent)]
     Remake(RemakeError),
+    /// The samples make no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// No table can be of the ratio.
+    #[error(transparent)]
+    Wheels(#[from] NoSuchWheels),
+    /// A calibration of the rows makes no table, or they turn by another ratio.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
 }
 
 impl PipelineError {
     /// Whether the input is to blame, and not the run.
     #[must_use]
-    pub const fn is_bad_input(&self) -> bool {
+    pub fn is_bad_input(&self) -> bool {
         match self {
-            PipelineError::Image(_)
-            | PipelineError::OtherDrive { .. }
-            | PipelineError::OtherKernels { .. }
-            | PipelineError::Read(_)
-            | PipelineError::Known(_)
-            | PipelineError::Diagnosis(_) => true,
-            PipelineError::NoDrive(_) | PipelineError::Fem(_) | PipelineError::Remake(_) => false,
+            PipelineError::Calibration(error) => error.is_bad_input(),
+            PipelineError::NoDrive(_)
+            | PipelineError::Fem(_)
+            | PipelineError::Remake(_)
+            | PipelineError::Table(_)
+            | PipelineError::Wheels(_) => false,
+            _ => true,
         }
     }
 }
+
+/// A model that holds causes, and what these add to the error of each row of each session, arcsec.
+type Known<'a> = (&'a Model, Vec<Vec<f64>>);
 
 /// What measured rows are held against: a catalogue's model, or a table made by FEM; and the drive.
 pub struct Subject<'a> {
@@ -178,11 +191,8 @@ impl<'a> Subject<'a> {
 
     /// Takes what the model says of causes known before from the errors.
     fn take_away_known(&self, recording: &mut Recording) -> Result<(), PipelineError> {
-        let Some(model) = self.model.as_ref().filter(|model| !model.causes.is_empty()) else { return Ok(()) };
-        let added = model.added_arcsec(&recording.sessions, self.sizes()).map_err(PipelineError::Known)?;
-        for (session, added) in recording.sessions.iter_mut().zip(added) {
-            session.error_rad.iter_mut().zip(added).for_each(|(e, a)| *e -= a / ARCSEC_PER_RAD);
-        }
+        let Some((model, added)) = self.known_arcsec(recording)? else { return Ok(()) };
+        less(&mut recording.sessions, added.iter());
         let names: Vec<&str> = model.causes.iter().map(|cause| cause.name.as_str()).collect();
         recording.notes.push(format!("the model holds {} already; what is found is beyond that", names.join(", ")));
         Ok(())
@@ -192,6 +202,45 @@ impl<'a> Subject<'a> {
         Sizes {
             pitch_radius_mm: self.drive.circular_spline.pitch_radius_mm(),
             base_radius_mm: self.drive.circular_spline.base_radius_mm(),
+        }
+    }
+
+    /// The model, if it holds causes that were found before.
+    fn extended(&self) -> Option<&Model> {
+        self.model.as_ref().filter(|model| !model.causes.is_empty())
+    }
+
+    /// What that model's causes add to the error of each session, arcsec.
+    fn known_arcsec(&self, recording: &Recording) -> Result<Option<Known<'_>>, PipelineError> {
+        let added = |model: &Model| model.added_arcsec(&recording.sessions, self.sizes());
+        let added = self.extended().map(|model| added(model).map(|added| (model, added)));
+        added.transpose().map_err(PipelineError::Known)
+    }
+
+    /// Rows as they were measured, what was known before among their errors.
+    fn as_measured(&self, recording: &Recording) -> Result<Option<Recording>, PipelineError> {
+        let Some((_, mut added)) = self.known_arcsec(recording)? else { return Ok(None) };
+        added.iter_mut().flatten().for_each(|added| *added = -*added);
+        let mut recording = recording.clone();
+        less(&mut recording.sessions, added.iter());
+        Ok(Some(recording))
+    }
+
+    /// The table of a model that holds causes, over the loads and temperatures of these recordings; none of another.
+    ///
+    /// # Errors
+    /// It makes no table.
+    pub fn known_table(&self, files: &[Recording]) -> Result<Option<MadeTable>, PipelineError> {
+        let made = |_| tables_of(self, &self.table_subject(), files).nominal(None);
+        self.extended().map(made).transpose()
+    }
+
+    /// What a calibration of the same rows begins with: the table given, that of causes known before, or the model.
+    fn prior<'t>(&'t self, known: Option<&'t Table<'t>>) -> Prior<'t> {
+        let TableSubject { hash, .. } = self.table_subject();
+        match known.or(self.table.as_ref()) {
+            Some(table) => Prior::of_table(table, self.kind),
+            None => Prior { hash, ..Prior::of_nominal(self.nominal.clone(), "catalogue drive", self.kind) },
         }
     }
 
@@ -235,8 +284,10 @@ pub struct Diagnosed {
     pub diagnosis: Diagnosis,
     /// The extended model.
     pub extended: Extended,
-    /// Compensation by session held out; or why there is none.
-    pub evaluation: Result<Evaluation, EvaluationError>,
+    /// The table of the causes known before.
+    known_table: Option<MadeTable>,
+    /// Compensation by session held out.
+    pub evaluation: Evaluation,
 }
 
 /// Reads the rows of a file, takes away what the model knows already, and averages rows that are too many.
@@ -259,6 +310,13 @@ pub fn parse_rows(
     subject: &Subject<'_>,
 ) -> Result<Recording, PipelineError> {
     let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
+    // Teeth that skip look like another ratio.
+    if recording.tooth_steps.is_empty() {
+        let said = check_ratio_of(&recording, subject.nominal.ratio);
+        let refused = |other| CalibrationError::Ratio { file: recording.file.clone(), other };
+        let said = said.map_err(refused)?;
+        recording.notes.extend(said);
+    }
     subject.take_away_known(&mut recording)?;
     let (nominal, table) = subject.against();
     channels::check_degrees(&recording, columns, nominal, table)?;
@@ -318,7 +376,10 @@ pub fn diagnose_rows(
     }
     progress(4, 5, "compensation by the core");
     let table_subject = subject.table_subject();
-    let tables = tables_of(subject, &table_subject, &recording.sessions);
+    let measured = subject.as_measured(&recording)?;
+    let known_table = subject.known_table(std::slice::from_ref(&recording))?;
+    let known = known_table.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PipelineError::Image)?;
+    let tables = tables_of(subject, &table_subject, std::slice::from_ref(&recording));
     let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
     let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, RemakeError> {
         let Some(make) = options.remake else { return Ok(None) };
@@ -328,20 +389,37 @@ pub fn diagnose_rows(
         Ok(remade(make, subject, &found, options.mesh)?.map(|made| made.image))
     };
     let remake: Option<&Remake<'_>> = if options.remake.is_some() { Some(&remake) } else { None };
-    let settings = Settings { fineness: Some(extended.fineness), ..settings };
-    let evaluation = match evaluate(&recording.sessions, &causes, &tables, &settings, remake) {
-        // The FEM failed, or was stopped.
-        Err(EvaluationError::Remake(what)) => return Err(PipelineError::Remake(what)),
-        evaluation => evaluation,
-    };
-    if let Ok(evaluation) = &evaluation {
-        diagnosis.compensation = Compensation {
-            rms_uncompensated_arcsec: evaluation.rms_uncompensated_arcsec,
-            rms_nominal_tables_arcsec: evaluation.rms_nominal_tables_arcsec,
-            rms_extended_tables_arcsec: evaluation.rms_extended_tables_arcsec,
+    let rows = [&recording, measured.as_ref().unwrap_or(&recording)];
+    let (found, prior) = ((&extended, causes.as_slice()), subject.prior(known.as_ref()));
+    let evaluation = evaluate(rows, found, &tables, &prior, &settings, remake)?;
+    diagnosis.compensated(&evaluation);
+    Ok(Diagnosed { recording, diagnosis, extended, known_table, evaluation })
+}
+
+/// The table that a diagnosis ends in.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct WrittenTable {
+    /// What it was made of.
+    pub kind: TableKind,
+    /// Its image beside `diagnosis.json`.
+    pub file: Option<String>,
+    /// What it leaves in rows left out of the fit, or the least that is left without it, arcsec rms.
+    pub rms_left_out_arcsec: f64,
+    /// Why this one.
+    pub why: String,
+}
+
+impl WrittenTable {
+    /// A line for a reader.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let what = match (self.kind, &self.file) {
+            (TableKind::Extended, Some(file)) => format!("that of the causes, {file}"),
+            (_, Some(file)) => format!("the calibrated one, {file}"),
+            (_, None) => "none is written".to_owned(),
         };
+        format!("table: {what}; {}", self.why)
     }
-    Ok(Diagnosed { recording, diagnosis, extended, evaluation })
 }
 
 /// What became of the causes, as it stands in `diagnosis.json`.
@@ -349,10 +427,13 @@ pub fn diagnose_rows(
 pub struct Extension {
     /// Files written beside diagnosis.json.
     pub files: Vec<String>,
+    /// Which table is written, and why that one.
+    #[serde(skip)]
+    pub table: WrittenTable,
     /// Why extended tables were not written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tables_not_written: Option<String>,
-    /// Identity of the extended table.
+    /// Identity of the table that is written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table_id: Option<String>,
     /// Whether the extended tables are of the FEM of the extended drive; else they are sampled from the extended model.
@@ -376,8 +457,26 @@ pub struct Made {
     pub extension: Extension,
     /// `drive-extended.toml`; none where no cause was found.
     pub drive_toml: Option<String>,
-    /// The extended table.
+    /// The table.
     pub table: Option<MadeTable>,
+}
+
+impl Made {
+    /// The files of the table with their contents; the image first.
+    #[must_use]
+    pub fn table_files(&self) -> Vec<(String, Vec<u8>)> {
+        let (Some(made), Some(file)) = (&self.table, &self.extension.table.file) else { return Vec::new() };
+        let info = serde_json::to_vec_pretty(&made.info).unwrap_or_default();
+        let stem = file.trim_end_matches(".fxt");
+        [
+            ("fxt", made.image.clone()),
+            ("json", info),
+            ("rs", rust_source(made).into_bytes()),
+            ("h", c_header(made).into_bytes()),
+        ]
+        .map(|(ending, content)| (format!("{stem}.{ending}"), content))
+        .into()
+    }
 }
 
 /// `diagnosis.json`: the diagnosis, the faults of the data and what was written.
@@ -385,6 +484,7 @@ pub struct Made {
 pub struct DiagnosisFile<'a> {
     #[serde(flatten)]
     diagnosis: &'a Diagnosis,
+    table: &'a WrittenTable,
     extension: &'a Extension,
     data_faults: &'a [Fault],
     notes: &'a [String],
@@ -396,11 +496,12 @@ impl Diagnosed {
     #[must_use]
     pub fn file<'a>(&'a self, extension: &'a Extension, command: &'a str) -> DiagnosisFile<'a> {
         let Recording { faults, notes, .. } = &self.recording;
-        DiagnosisFile { diagnosis: &self.diagnosis, extension, data_faults: faults, notes, command }
+        let table = &extension.table;
+        DiagnosisFile { diagnosis: &self.diagnosis, table, extension, data_faults: faults, notes, command }
     }
 
-    /// Makes the extended drive, and the extended tables if they are worth it; nothing where no cause was found.
-    /// `by_fem` is called before the FEM of the drive begins.
+    /// Makes the extended drive where causes were found, and the table that leaves least in rows left out, if one
+    /// gains. `by_fem` is called before the FEM of the drive begins.
     ///
     /// # Errors
     /// The causes make no drive; the FEM of it does not converge.
@@ -410,46 +511,69 @@ impl Diagnosed {
         options: &Options<'_>,
         by_fem: impl FnOnce(),
     ) -> Result<Made, PipelineError> {
-        let mut extension = Extension {
-            tables_not_written: match &self.evaluation {
-                Ok(evaluation) => evaluation.worth_writing().err().map(|why| why.to_string()),
-                Err(error) => Some(error.to_string()),
-            },
-            compensation: self.evaluation.as_ref().ok().cloned(),
-            ..Extension::default()
-        };
-        if self.diagnosis.causes.is_empty() {
-            return Ok(Made { extension, ..Made::default() });
-        }
+        let evaluation = &self.evaluation;
+        let mut extension = Extension { compensation: Some(evaluation.clone()), ..Extension::default() };
         let table_subject = subject.table_subject();
-        let tables = tables_of(subject, &table_subject, &self.recording.sessions);
-        let mut table: Option<MadeTable> = None;
-        let drive_toml = match &subject.model {
-            Some(known) => {
-                let mut model = Model::of_diagnosis(&subject.nominal, &self.diagnosis, &self.extended);
-                model.causes.splice(0..0, known.causes.iter().cloned());
-                extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
-                model.to_toml()
+        let tables = tables_of(subject, &table_subject, std::slice::from_ref(&self.recording));
+        let gain = evaluation.tables_that_gain(subject.table.is_some());
+        let mut by_drive: Option<MadeTable> = None;
+        let mut drive_toml = None;
+        if let Some(known) = subject.model.as_ref().filter(|_| !self.diagnosis.causes.is_empty()) {
+            let mut model = Model::of_diagnosis(&subject.nominal, &self.diagnosis, &self.extended);
+            model.causes.splice(0..0, known.causes.iter().cloned());
+            extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
+            drive_toml = Some(model.to_toml());
+        } else if !self.diagnosis.causes.is_empty() {
+            let found = self.geometry(subject, &tables, options, by_fem, &mut extension)?;
+            extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
+            extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
+            if let (Some(make), Some((TableKind::Extended, _))) = (options.remake, gain.first()) {
+                by_drive = remade(make, subject, &found, options.mesh).map_err(PipelineError::Remake)?;
+                extension.tables_by_fem = by_drive.is_some();
             }
-            None => {
-                let found = self.geometry(subject, &tables, options, by_fem, &mut extension)?;
-                extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
-                extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
-                if let (Some(make), None) = (options.remake, &extension.tables_not_written) {
-                    table = remade(make, subject, &found, options.mesh).map_err(PipelineError::Remake)?;
-                    extension.tables_by_fem = table.is_some();
-                }
-                found.drive.to_toml() + &causes_to_toml(&found.rest)
-            }
-        };
-        if extension.tables_not_written.is_none() && table.is_none() {
-            match tables.extended(&self.extended) {
+            drive_toml = Some(found.drive.to_toml() + &causes_to_toml(&found.rest));
+        }
+        let (mut table, mut why) = (None, evaluation.words());
+        for (kind, rms_left_out_arcsec) in gain {
+            let (stem, made) = match (kind, by_drive.take()) {
+                (TableKind::Extended, Some(made)) => (format!("{}-extended", subject.kind), Ok(made)),
+                (TableKind::Extended, None) => (format!("{}-extended", subject.kind), tables.extended(&self.extended)),
+                _ => ("calibrated".to_owned(), self.calibrated(subject, &tables)),
+            };
+            let file = Some(format!("{stem}.fxt"));
+            extension.table = WrittenTable { kind, file, rms_left_out_arcsec, why: String::new() };
+            match made {
                 Ok(made) => table = Some(made),
-                Err(error) => extension.tables_not_written = Some(error.to_string()),
+                Err(error) => why += &format!("; {error}"),
             }
+            if table.is_some() {
+                break;
+            }
+        }
+        if table.is_none() {
+            let least = evaluation.left.rms_uncompensated_arcsec.min(evaluation.left.rms_nominal_tables_arcsec);
+            extension.table = WrittenTable { rms_left_out_arcsec: least, ..WrittenTable::default() };
+        }
+        extension.table.why = why;
+        if extension.table.kind != TableKind::Extended && !self.diagnosis.causes.is_empty() {
+            extension.tables_not_written = Some(extension.table.text());
         }
         extension.table_id = table.as_ref().map(|made| made.info.table_id.clone());
-        Ok(Made { extension, drive_toml: Some(drive_toml), table })
+        Ok(Made { extension, drive_toml, table })
+    }
+
+    /// The table of a calibration of the same rows, less what a cause of the output's encoder adds.
+    fn calibrated(&self, subject: &Subject<'_>, tables: &ExtendedTables<'_>) -> Result<MadeTable, PipelineError> {
+        let mut recording = subject.as_measured(&self.recording)?.unwrap_or_else(|| self.recording.clone());
+        let series = self.extended.predict(&self.recording.sessions, &subject.nominal, subject.table.as_ref());
+        for (k, cause) in self.extended.causes().iter().enumerate() {
+            if tables.left_out(cause.name(), cause.at_output()) == Some(OF_THE_OUTPUT_ENCODER) {
+                less(&mut recording.sessions, series.iter().map(|series| &series.cause_arcsec[k]));
+            }
+        }
+        let known = self.known_table.as_ref().map(|made| Table::check(&made.image)).transpose();
+        let known = known.map_err(PipelineError::Image)?;
+        Ok(table_of(&[recording], &subject.prior(known.as_ref()))?)
     }
 
     /// The drive with the causes that are geometry, as far as the FEM bears them out.
@@ -503,11 +627,11 @@ fn remade(
 
 /// Tables of the extended model over what the rows hold: their largest torque, their temperatures, the angle against
 /// gravity if it stays.
-fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, sessions: &[Session]) -> ExtendedTables<'a> {
+fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, files: &[Recording]) -> ExtendedTables<'a> {
     let all = |column: fn(&Session) -> Option<&Vec<f64>>| {
-        sessions.iter().filter_map(column).flatten().copied().fold(None, |range: Option<[f64; 2]>, value| {
-            Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
-        })
+        let values = files.iter().flat_map(|file| &file.sessions).filter_map(column).flatten().copied();
+        let (low, high) = least_and_most(values);
+        (low <= high).then_some([low, high])
     };
     let torque = all(|s| s.torque_n_m.as_ref()).unwrap_or([0.0; 2]);
     let temperature = all(|s| s.temperature_c.as_ref()).unwrap_or([subject.nominal.temperature_c; 2]);
@@ -515,6 +639,7 @@ fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, sessions: &[Ses
     ExtendedTables {
         nominal: &subject.nominal,
         table: subject.table.as_ref(),
+        known: subject.extended().map(|model| (model, subject.sizes())),
         subject: of,
         torque_n_m: torque[0].abs().max(torque[1].abs()),
         temperatures_c: temperature,

@@ -8,11 +8,11 @@ use rayon::prelude::*;
 use super::LEAST_ROWS;
 use super::base::{Base, Floating, NEAR_FRICTION, few};
 use super::candidate::{Excitation, Law, Regressor, Tolerance};
-use super::linear::{Gram, Prior, solve};
 use super::model::{Problem, Term};
 use super::noise::{Noise, Whitener, white_level};
 use super::report::Finding;
 use super::rows::{Rows, add_scaled, quantile, rms, robust_std};
+use crate::linear::{Gram, Prior, solve};
 use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_TURN;
 

@@ -8,7 +8,7 @@ use std::ops::{Deref, Range};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 
-use super::linear::{Gram, products};
+use crate::linear::{Gram, products};
 
 static SETS: AtomicU64 = AtomicU64::new(0);
 

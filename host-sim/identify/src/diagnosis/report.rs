@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::channels::RatioProposal;
+use super::thresholds::verdict::LEAST_GAIN_OF_A_NAME;
 use super::trace::Trace;
 use crate::causes::{CauseName, ParameterName};
+use crate::extension::Evaluation;
 
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -134,16 +135,36 @@ pub struct Compensation {
     pub rms_uncompensated_arcsec: f64,
     /// Corrected by the nominal model as it stands.
     pub rms_nominal_tables_arcsec: f64,
+    /// Corrected by the table of a calibration of the other sessions; absent where it makes none.
+    pub rms_calibrated_table_arcsec: Option<f64>,
     /// Corrected by the model with the causes, in sessions that took no part in the fit.
     pub rms_extended_tables_arcsec: f64,
 }
 
 impl Compensation {
+    /// The least that is left without a table, with the nominal and with the calibrated one, arcsec.
+    #[must_use]
+    pub(super) fn without_causes_arcsec(&self) -> f64 {
+        let calibrated = self.rms_calibrated_table_arcsec.unwrap_or(f64::INFINITY);
+        self.rms_uncompensated_arcsec.min(self.rms_nominal_tables_arcsec).min(calibrated)
+    }
+
     /// Whether it was evaluated: no data are without any error.
     #[must_use]
     pub fn is_known(&self) -> bool {
         self.rms_uncompensated_arcsec > 0.0
     }
+}
+
+/// A cause that was found and gains too little in sessions left out to be named.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Hint {
+    /// Its name.
+    pub name: CauseName,
+    /// Share of the rms in sessions left out that it takes of what the other causes leave.
+    pub gain: f64,
+    /// Why it is no cause.
+    pub why_not_a_cause: String,
 }
 
 /// Something found that has no name.
@@ -166,6 +187,8 @@ pub struct Diagnosis {
     pub finding: Finding,
     /// Causes, strongest first.
     pub causes: Vec<Cause>,
+    /// Causes that gain too little to be named.
+    pub hints: Vec<Hint>,
     /// Over all data.
     pub residual: Residual,
     /// Over sessions left out.
@@ -182,9 +205,6 @@ pub struct Diagnosis {
     pub wander_correlation_s: f64,
     /// What to record to tell look-alikes apart.
     pub next_experiment: Option<String>,
-    /// The whole ratio that the nominal one may be meant to be, where the data turn by another.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ratio_proposed: Option<RatioProposal>,
     /// Of the cause that was asked about, if it is not named: what to record to tell it from those that are.
     #[serde(skip)]
     pub experiment_for_asked: Option<String>,
@@ -212,7 +232,29 @@ impl Parameter {
     }
 }
 
+impl Hint {
+    /// A cause with this gain.
+    pub(super) fn of(name: CauseName, gain: f64) -> Hint {
+        let (gain_percent, least) = (100.0 * gain, 100.0 * LEAST_GAIN_OF_A_NAME);
+        let why_not_a_cause =
+            format!("it takes {gain_percent:.1} % of the rms in sessions left out; a cause takes {least:.0} %");
+        Hint { name, gain, why_not_a_cause }
+    }
+}
+
 impl Diagnosis {
+    /// Takes over what the core leaves in sessions left out. Causes explain the error in part if they, or their table,
+    /// leave more there than the best of no table, the nominal and the calibrated one, by what counts as a gain of a
+    /// name.
+    pub(super) fn compensated(&mut self, evaluation: &Evaluation) {
+        self.compensation = evaluation.left;
+        let least = (1.0 - LEAST_GAIN_OF_A_NAME).recip() * evaluation.left.without_causes_arcsec();
+        let by_table = !evaluation.applied.is_empty() && evaluation.left.rms_extended_tables_arcsec > least;
+        if self.verdict == Verdict::Explained && (by_table || self.held_out.rms_after_arcsec > least) {
+            self.verdict = Verdict::PartlyExplained;
+        }
+    }
+
     /// Takes back all causes: the data do not say what the unit does. `advice` is what to change at the bench.
     pub(super) fn say_nothing_of_the_unit(&mut self, advice: &str) {
         let unnamed = |cause: Cause| Unexplained {
@@ -221,9 +263,9 @@ impl Diagnosis {
         };
         let causes = std::mem::take(&mut self.causes);
         self.unexplained.extend(causes.into_iter().map(unnamed));
+        self.hints.clear();
         (self.verdict, self.finding) = (Verdict::Unknown, Finding::DataUnusable);
         self.held_out.rms_after_arcsec = self.held_out.rms_before_arcsec;
-        self.ratio_proposed = None;
         self.next_experiment = Some(format!("{advice}; then the same run again"));
     }
 
@@ -239,24 +281,6 @@ impl Diagnosis {
             Verdict::Unknown => "a discrepancy that no known cause explains",
         };
         let _ = writeln!(text, "finding: {}", self.finding.words());
-        let c = &self.compensation;
-        if self.finding != Finding::DataUnusable && c.is_known() {
-            // The one number first: what is left where it is used.
-            let _ = if self.causes.is_empty() {
-                writeln!(
-                    text,
-                    "left after correction: {:.2} arcsec rms with the nominal table, {:.2} without a table",
-                    c.rms_nominal_tables_arcsec, c.rms_uncompensated_arcsec
-                )
-            } else {
-                writeln!(
-                    text,
-                    "left after correction, in data left out of the fit: {:.2} -> {:.2} arcsec rms, with the nominal \
-                     table and with one that holds the causes; {:.2} without a table",
-                    c.rms_nominal_tables_arcsec, c.rms_extended_tables_arcsec, c.rms_uncompensated_arcsec
-                )
-            };
-        }
         let _ = writeln!(text, "verdict: {verdict}");
         for cause in &self.causes {
             let _ = writeln!(
@@ -275,6 +299,9 @@ impl Diagnosis {
             if !alike.is_empty() {
                 let _ = writeln!(text, "    cannot be told from: {}", alike.join(", "));
             }
+        }
+        for Hint { name, why_not_a_cause, .. } in &self.hints {
+            let _ = writeln!(text, "  a hint, no cause: {name}, {why_not_a_cause}");
         }
         for left in &self.unexplained {
             let _ = writeln!(text, "  without a cause: {}, {:.1} arcsec rms", left.looks_like, left.size_arcsec);
@@ -295,13 +322,6 @@ impl Diagnosis {
             r.rms_after_arcsec,
             r.noise_floor_arcsec
         );
-        if let Some(ratio) = self.ratio_proposed {
-            let _ = writeln!(
-                text,
-                "ratio: the data turn by {:.3}; if it is a drive of {}, say so in the model, and diagnose again",
-                ratio.found, ratio.proposed
-            );
-        }
         if let Some(next) = &self.next_experiment {
             let _ = writeln!(text, "next: {next}");
         }
@@ -317,6 +337,49 @@ mod tests {
     fn a_confidence_is_written_with_four_digits() {
         let written = |value: f64| four_digits(&value, serde_json::value::Serializer).unwrap();
         assert_eq!([0.989_999_997_9, 1.0 / 3.0].map(written), [0.99, 0.3333]);
+    }
+
+    /// Causes that leave more in rows left out than a table without names are not all of it.
+    #[test]
+    fn causes_that_leave_more_than_a_calibrated_table_do_not_explain_the_error() {
+        let nominal = crate::synthesize::catalogue_drive();
+        let session = |k: usize| crate::measurement::Session {
+            line: (0..600).collect(),
+            generator_rad: (0..600).map(|row| 0.11 * row as f64).collect(),
+            error_rad: (0..600).map(|row| 1e-6 * ((row * 7919 + k) % 13) as f64).collect(),
+            ..Default::default()
+        };
+        let sessions: Vec<_> = (0..3).map(session).collect();
+        let settings = crate::diagnosis::Settings::default();
+        let found = crate::diagnosis::diagnose(&sessions, &nominal, None, &settings, |_, _, _| {}).unwrap();
+        let after = |rms_after_arcsec, extended, calibrated, applied: &[CauseName]| {
+            let left = Compensation {
+                rms_uncompensated_arcsec: 90.0,
+                rms_nominal_tables_arcsec: 40.0,
+                rms_calibrated_table_arcsec: calibrated,
+                rms_extended_tables_arcsec: extended,
+            };
+            let applied = applied.to_vec();
+            let evaluation = Evaluation { left, applied, ..Evaluation::default() };
+            let held_out = HeldOut { rms_after_arcsec, ..found.held_out };
+            let mut diagnosis = Diagnosis { verdict: Verdict::Explained, held_out, ..found.clone() };
+            diagnosis.compensated(&evaluation);
+            assert_eq!(diagnosis.compensation, left);
+            diagnosis.verdict
+        };
+        let cause = [CauseName::BacklashGrowth];
+        assert_eq!(after(5.0, 5.1, Some(5.1), &cause), Verdict::Explained);
+        assert_eq!(after(5.0, 5.2, Some(3.0), &cause), Verdict::PartlyExplained);
+        assert_eq!(after(5.0, 40.0, Some(3.0), &[]), Verdict::PartlyExplained);
+        // What no table can hold is explained by names alone.
+        assert_eq!(after(5.0, 40.0, Some(12.0), &[]), Verdict::Explained);
+        assert_eq!(after(41.0, 40.0, None, &[]), Verdict::Explained, "within what counts as a gain");
+    }
+
+    #[test]
+    fn a_name_that_gains_too_little_is_a_hint() {
+        assert!(Hint::of(CauseName::Wear, 0.02).why_not_a_cause.contains("it takes 2.0 % of the rms"));
+        assert!(Hint::of(CauseName::Wear, -0.1).why_not_a_cause.contains("it takes -10.0 %"));
     }
 
     #[test]

@@ -3,10 +3,10 @@
 //! at first, for the laws that live in them; where one shows, every row is kept.
 
 use super::candidate::{Excitation, Law, Tolerance};
-use super::linear::{Gram, Prior, solve};
 use super::noise::Whitener;
 use super::rows::{Rows, combined, rms, robust_std};
 use crate::causes::CauseName;
+use crate::linear::{Gram, Prior, solve};
 
 /// Rows whose mean is taken from each of them, to see what is fast. *Guess*: what passes within a few rows is fast.
 const TOGETHER: usize = 5;

@@ -107,7 +107,7 @@ fn refitted<'l>(
         .filter_map(|law| {
             let tried: Vec<(f64, Vec<f64>)> = begin(&scaffold, law)
                 .into_iter()
-                .filter_map(|places| Some((-scaffold.trial(law, &places)?.misfit, places)))
+                .filter_map(|places| Some((-scaffold.trial(law, &places, law.search.whole)?.misfit, places)))
                 .collect();
             let best = tried.iter().fold(f64::NEG_INFINITY, |best: f64, (worth, _)| best.max(*worth));
             // Far away already: no refinement brings it back; farther for what a lead only points at.

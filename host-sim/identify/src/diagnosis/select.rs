@@ -250,7 +250,7 @@ fn tried(
     let tried: Vec<(usize, f64, Vec<f64>)> = trials
         .into_par_iter()
         .with_max_len(4)
-        .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places)?.evidence, places)))
+        .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places, laws[k].search.whole)?.evidence, places)))
         .filter(|(_, evidence, _)| evidence.is_finite())
         .collect();
     let mut by_law: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); laws.len()];
@@ -283,7 +283,7 @@ fn best_tried<'l>(
         .into_par_iter()
         .with_max_len(1)
         .filter_map(|(law, places)| {
-            let evidence = scaffold.whole_trial(law, &places)?.evidence;
+            let evidence = scaffold.trial(law, &places, true)?.evidence;
             evidence.is_finite().then_some((evidence, law, places))
         })
         .collect();
@@ -390,7 +390,7 @@ pub fn predicted(problem: &Problem<'_>, terms: &[&Term<'_>], fit: &Fit) -> Vec<f
     super::rows::combined(problem.data.len(), columns, &fit.solution.coefficients)
 }
 
-/// Relative gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
+/// Gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
 fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
     // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first
     // column is the zero.
@@ -401,20 +401,8 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
         for block in 0..problem.blocks().len() {
             let inside = problem.gram(terms, None, Some(block));
             let solution = fit.without(&inside, problem.worth)?;
-            let n = fit.priors.len();
             let c = &solution.coefficients;
-            let mut left = inside.at(n, n);
-            for i in 0..n {
-                left -= 2.0 * c[i] * inside.at(i, n);
-                for j in 0..n {
-                    left += c[i] * c[j] * inside.at(i, j);
-                }
-            }
-            if own {
-                let along: f64 = inside.at(0, n) - (0..n).map(|j| c[j] * inside.at(0, j)).sum::<f64>();
-                left -= along * along / inside.at(0, 0).max(f64::MIN_POSITIVE);
-            }
-            all += left;
+            all += if own { inside.first_free().left_by(&c[1..]) } else { inside.left_by(c) };
         }
         Some(all)
     };

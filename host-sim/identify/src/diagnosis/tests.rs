@@ -514,7 +514,9 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
     let used = [true, false, true, false, true];
     let causes = [CauseName::TorsionalHysteresis, CauseName::SensorLatency];
     let settings = Settings::default();
-    let extended = Extended::fit_to(&sessions, &used, &nominal, None, &causes, &settings).unwrap();
+    let (_, all) = super::diagnose_extended(&sessions, &nominal, None, &settings, |_, _, _| {}).unwrap();
+    let settings = (&settings, all.fineness);
+    let extended = Extended::fit_to(&sessions, &used, &nominal, None, &causes, settings).unwrap();
     assert_eq!(extended.causes().len(), 2);
     let series = extended.predict(&sessions, &nominal, None);
     let square = |values: Vec<f64>, uncertain: &[bool]| -> f64 {
@@ -536,7 +538,7 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
     for k in [1, 3] {
         changed[k].error_rad.iter_mut().for_each(|e| *e *= -3.0);
     }
-    let again = Extended::fit_to(&changed, &used, &nominal, None, &causes, &settings).unwrap();
+    let again = Extended::fit_to(&changed, &used, &nominal, None, &causes, settings).unwrap();
     assert_eq!(again.predict(&sessions, &nominal, None), series);
 }
 

@@ -21,8 +21,8 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// The sample, with the nominal model over it.
 pub(crate) struct Thinned {
-    rows: Rows,
-    base: Base,
+    pub rows: Rows,
+    pub base: Base,
     /// Rows taken.
     kept: Vec<usize>,
     /// Share of the rows that the sample is.
@@ -62,12 +62,6 @@ impl Thinned {
         };
         Some(Thinned { rows, base, kept, share })
     }
-
-    /// The excitation of the sample, with nothing that other causes change.
-    #[must_use]
-    pub(crate) fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
-        Excitation { rows: &self.rows, base: &self.base, ..*on }
-    }
 }
 
 /// The sample as models are fitted to it.
@@ -81,7 +75,7 @@ impl<'a> Sample<'a> {
     /// The sample where these of all rows are uncertain.
     #[must_use]
     pub fn new(on: &Excitation<'a>, thinned: &'a Thinned, uncertain: &[bool], stride: usize) -> Sample<'a> {
-        let on = thinned.excitation(on);
+        let on = on.over(&thinned.rows, &thinned.base);
         Sample { on, uncertain: thinned.kept.iter().map(|k| uncertain[*k]).collect(), stride }
     }
 

@@ -8,13 +8,15 @@
 use std::fmt;
 use std::io::Write as _;
 
-use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
 
 use super::candidate::{Label, Law};
 use crate::causes::{CauseName, Need, ParameterName};
 
 /// Where in the search a decision fell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Stage {
     /// Before the search: can these data speak of the cause at all?
     Data,
@@ -37,39 +39,32 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Its name in files, and its words for a reader.
-    const fn spec(self) -> (&'static str, &'static str) {
-        match self {
-            Stage::Data => ("data", "the data"),
-            Stage::Tried => ("tried", "tried at many places"),
-            Stage::Forward => ("forward", "refined beside the causes chosen before"),
-            Stage::Backward => ("backward", "held against what was chosen after it"),
-            Stage::Exchange => ("exchange", "tried in the place of another cause"),
-            Stage::Settled => ("settled", "at the end of the search"),
-            Stage::Understood => ("understood", "beside what has no name"),
-            Stage::Rival => ("rival", "against its rivals"),
-            Stage::Verdict => ("verdict", "the verdict"),
-        }
-    }
-
-    /// Its name in files.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        self.spec().0
-    }
-
     /// Its words for a reader.
     #[must_use]
     pub const fn words(self) -> &'static str {
-        self.spec().1
+        match self {
+            Stage::Data => "the data",
+            Stage::Tried => "tried at many places",
+            Stage::Forward => "refined beside the causes chosen before",
+            Stage::Backward => "held against what was chosen after it",
+            Stage::Exchange => "tried in the place of another cause",
+            Stage::Settled => "at the end of the search",
+            Stage::Understood => "beside what has no name",
+            Stage::Rival => "against its rivals",
+            Stage::Verdict => "the verdict",
+        }
     }
 }
 
+/// The name of a stage or a gate in files.
+fn name_of(value: &impl Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
 /// A gate that a law has to pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Gate {
-    /// The data hold what it needs.
-    Needs(Need),
     /// A parameter of the nominal model has left its tolerance, in standard deviations between units.
     Tolerance,
     /// There is room: this many causes, or deviations, are chosen at most.
@@ -114,50 +109,12 @@ pub enum Gate {
     AsRival,
     /// All causes together predict sessions left out no worse than the nominal model, arcsec rms.
     NoWorse,
+    /// The data hold what it needs.
+    #[serde(untagged)]
+    Needs(Need),
 }
 
 impl Gate {
-    /// As it stands in files.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Gate::Needs(Need::Teeth) => "needs_teeth",
-            Gate::Needs(Need::Turns) => "needs_turns",
-            Gate::Needs(Need::Load) => "needs_torque",
-            Gate::Needs(Need::Spring) => "needs_stiffness",
-            Gate::Needs(Need::Temperature) => "needs_temperature",
-            Gate::Needs(Need::TemperatureSpan) => "needs_temperatures",
-            Gate::Needs(Need::Time) => "needs_time",
-            Gate::Needs(Need::Motion) => "needs_motion",
-            Gate::Needs(Need::Swings) => "needs_changes",
-            Gate::Needs(Need::HalfOutputTurn) => "needs_half_output_turn",
-            Gate::Needs(Need::Use) => "needs_use",
-            Gate::Needs(Need::Jump) => "needs_jump",
-            Gate::Tolerance => "tolerance",
-            Gate::Room => "room",
-            Gate::Refined => "refined",
-            Gate::Sense => "sense",
-            Gate::Deviations => "deviations",
-            Gate::Gain => "gain",
-            Gate::First => "first",
-            Gate::Evidence => "evidence",
-            Gate::Size => "size",
-            Gate::SizeIfClear => "size_if_clear",
-            Gate::Alone => "alone",
-            Gate::LeftOut => "left_out",
-            Gate::Ahead => "ahead",
-            Gate::SamePlace => "same_place",
-            Gate::NoGrowthWithSpeed => "no_growth_with_speed",
-            Gate::LoadKnown => "load_known",
-            Gate::NoLineBeside => "no_line_beside",
-            Gate::KnownWell => "known_well",
-            Gate::ToldFromZero => "told_from_zero",
-            Gate::ToldApart => "told_apart",
-            Gate::AsRival => "as_rival",
-            Gate::NoWorse => "no_worse",
-        }
-    }
-
     /// What it asks, as a sentence of which the law is the subject.
     #[must_use]
     pub const fn asks(self) -> &'static str {
@@ -290,7 +247,7 @@ impl Step {
 
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {} {} {}", self.round, self.stage.as_str(), if self.passed() { '+' } else { '-' }, self.label)?;
+        write!(f, "{} {} {} {}", self.round, name_of(&self.stage), if self.passed() { '+' } else { '-' }, self.label)?;
         for (k, (name, value)) in self.shape.iter().enumerate() {
             write!(f, "{}{name} {value:.4}", if k == 0 { " at " } else { ", " })?;
         }
@@ -298,7 +255,7 @@ impl fmt::Display for Step {
             write!(f, ", against {against}")?;
         }
         for (k, judged) in self.gates.iter().enumerate() {
-            write!(f, "{} {}", if k == 0 { ':' } else { ',' }, judged.gate.as_str())?;
+            write!(f, "{} {}", if k == 0 { ':' } else { ',' }, name_of(&judged.gate))?;
             if let (Some(value), Some(limit)) = (judged.value, judged.limit) {
                 write!(f, " {value:.2} of {limit:.2}")?;
             }
@@ -322,12 +279,6 @@ impl Trace {
     #[must_use]
     pub fn new(aloud: bool) -> Trace {
         Trace { aloud, ..Trace::default() }
-    }
-
-    /// All decisions in their order.
-    #[must_use]
-    pub fn steps(&self) -> &[Step] {
-        &self.steps
     }
 
     /// Another round of the search begins.
@@ -407,9 +358,9 @@ impl Serialize for Entry<'_> {
         let Entry(step, judged) = self;
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("cause", &step.label.to_string())?;
-        map.serialize_entry("stage", step.stage.as_str())?;
+        map.serialize_entry("stage", &step.stage)?;
         map.serialize_entry("round", &step.round)?;
-        map.serialize_entry("gate", judged.gate.as_str())?;
+        map.serialize_entry("gate", &judged.gate)?;
         map.serialize_entry("value", &judged.value.filter(|value| value.is_finite()))?;
         map.serialize_entry("limit", &judged.limit.filter(|limit| limit.is_finite()))?;
         map.serialize_entry("passed", &judged.passed)?;
@@ -425,13 +376,8 @@ pub(crate) struct Entries<'a>(pub Vec<&'a Step>);
 
 impl Serialize for Entries<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut seq = serializer.serialize_seq(None)?;
-        for step in &self.0 {
-            for judged in &step.gates {
-                seq.serialize_element(&Entry(step, judged))?;
-            }
-        }
-        seq.end()
+        let gates = self.0.iter().flat_map(|step| step.gates.iter().map(|judged| Entry(step, judged)));
+        serializer.collect_seq(gates)
     }
 }
 

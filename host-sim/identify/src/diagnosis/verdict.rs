@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::candidate::{Label, Law, Per, standing_pitch_error};
-use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Problem, Term};
 use super::noise::Noise;
-use super::report::{Cause, Compensation, Diagnosis, Finding, HeldOut, Parameter, Residual, Unexplained, Verdict};
+use super::report::{
+    Cause, Compensation, Diagnosis, Finding, HeldOut, Hint, Parameter, Residual, Unexplained, Verdict,
+};
 use super::select::{self, Selected, Standing, standings};
 use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
@@ -54,17 +55,30 @@ pub(super) fn conclude(
     let unnamed = Unnamed::beside(&selected, &standings, &left_over, hidden_lines);
     let left_of_noise = rms_after / floor.max(1e-30);
     let named = understood(problem, &selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
+    let held = held_out::evaluate(problem, &all);
+    // What predicts sessions left out hardly better than the others do is a hint: it says nothing of the drive.
+    let mut hints = Vec::new();
+    let (named, too_little): (Vec<usize>, Vec<usize>) = named
+        .into_iter()
+        .partition(|k| held.gains_beside[*k].is_nan() || held.gains_beside[*k] >= LEAST_GAIN_OF_A_NAME);
+    for k in &too_little {
+        let (label, gain) = (selected.terms[*k].law.label, held.gains_beside[*k]);
+        let gates = vec![Judged::above(Gate::LeftOut, gain, LEAST_GAIN_OF_A_NAME)];
+        trace.decided(Stage::Verdict, label, None, gates);
+        hints.extend(selected.terms[*k].law.cause().map(|name| Hint::of(name, gain)));
+    }
+    let only_hints = |k: usize| too_little.contains(&k) && held.gains_beside[k] >= 0.0;
     // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not
     // understood with nothing else found.
     let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
-    let without_name = |k: usize| !named.contains(&k) && !selected.terms[k].law.is_zero_of_sessions();
+    let without_name = |k: usize| !named.contains(&k) && !only_hints(k) && !selected.terms[k].law.is_zero_of_sessions();
     let significant_left = !left_over.is_empty() || (0..selected.terms.len()).any(without_name) || zeros_alone;
-    let held = held_out::evaluate(problem, &all);
-    // What does not predict sessions it was not fitted to is no explanation.
+    // What does not predict sessions it was not fitted to, better than the adapted model and than none, is no
+    // explanation.
     let (before_out, after_out) = (held.total.rms_before_arcsec, held.total.rms_after_arcsec);
-    let most = NO_WORSE * before_out;
+    let most = NO_WORSE * before_out.min(compensation(problem, after_out).rms_uncompensated_arcsec);
     let no_worse = Judged::number(Gate::NoWorse, after_out, most, after_out <= most);
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
@@ -157,6 +171,7 @@ pub(super) fn conclude(
     }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
         .filter(|k| !named.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !too_little.contains(k))
         .filter(|k| !of_the_bench(&selected.terms[*k]))
         .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
@@ -168,8 +183,8 @@ pub(super) fn conclude(
         schema_version: 1,
         verdict,
         finding: Finding::of(verdict),
-        ratio_proposed: ratio_proposed(&causes, problem.on.nominal.ratio),
         causes,
+        hints,
         residual: Residual {
             rms_before_arcsec: rms_before,
             rms_after_arcsec: rms_after,
@@ -177,7 +192,7 @@ pub(super) fn conclude(
             // left.
             noise_floor_arcsec: floor.min(rms_after),
             unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
-            rows_averaged: problem.whitener.stride(),
+            rows_averaged: problem.whitener.stride,
         },
         held_out,
         compensation: compensation(problem, held_out.rms_after_arcsec),
@@ -250,15 +265,8 @@ fn is_whole_pitches(jump_arcsec: f64, std_arcsec: f64, pitch_arcsec: f64) -> boo
 /// the nominal one and none at all.
 fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: HeldOut) -> bool {
     let compared = compensation(problem, held_out.rms_after_arcsec);
-    let best_without = compared.rms_uncompensated_arcsec.min(held_out.rms_before_arcsec);
+    let best_without = compared.without_causes_arcsec().min(held_out.rms_before_arcsec);
     rms_after <= NEAR_NOISE * floor && compared.rms_extended_tables_arcsec < best_without
-}
-
-/// The ratio that may be meant, where it is wrong.
-fn ratio_proposed(causes: &[Cause], nominal_ratio: f64) -> Option<RatioProposal> {
-    let wrong = causes.iter().find(|cause| cause.name == CauseName::RatioError)?;
-    let error = wrong.parameters.get(ParameterName::RatioRelativeError.as_str())?;
-    proposed_ratio(nominal_ratio, error.value)
 }
 
 /// Sizes of what has no name, arcsec: the largest, all together, and lines in time with their frequencies, Hz. A zero
@@ -436,6 +444,7 @@ fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
     Compensation {
         rms_uncompensated_arcsec: about_mean(problem.whitener.average(&problem.on.rows.error)),
         rms_nominal_tables_arcsec: about_mean(problem.data.clone()),
+        rms_calibrated_table_arcsec: None,
         rms_extended_tables_arcsec: rms_extended,
     }
 }

@@ -6,16 +6,16 @@
 //!   FEM.
 //! * `ExtendedTables`: tables of the extended model, sampled in steady motion at the nodes of a table.
 //! * [`evaluate`]: what the core leaves of the error in sessions that took no part in the fit, without tables, with
-//!   nominal and with extended ones.
+//!   nominal, calibrated and extended ones.
 
 mod compensation;
 mod geometry;
 mod model;
 mod sampled;
 
+pub(crate) use compensation::less;
 pub use compensation::{
-    Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, Remake, RemakeError, evaluate,
-    left_by_core, split,
+    Compensated, Evaluation, NotApplied, Remake, RemakeError, TableKind, evaluate, left_by_core, split,
 };
 pub(crate) use geometry::{FemAgreement, FoundGeometry, Placing, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};

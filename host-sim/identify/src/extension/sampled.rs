@@ -6,12 +6,14 @@ use std::f64::consts::TAU;
 use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 use flexspline::{Direction, Table};
 
+use super::model::{CauseEntry, Model};
 use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER, ParameterName};
-use crate::diagnosis::{Extended, FittedCause};
+use crate::diagnosis::{Extended, PipelineError, Series, nominal_arcsec};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
+use crate::synthesize::Sizes;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_design::tables::{MadeTable, Source, TableError, from_plan, places_that_tell_apart};
+use flexspline_design::tables::{MadeTable, Source, from_plan, places_that_tell_apart};
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Positions over a whole turn of the output, at least and at most. Fitted are a few dozen numbers at each load.
@@ -86,6 +88,8 @@ pub struct ExtendedTables<'a> {
     pub nominal: &'a Nominal,
     /// The table that takes its place, if there is one.
     pub table: Option<&'a Table<'a>>,
+    /// The model whose causes were known before, if there are any.
+    pub known: Option<(&'a Model, Sizes)>,
     /// The target of the table.
     pub subject: &'a TableSubject,
     /// Torque, N·m, and temperatures, °C, of the data, where no table gives the axes.
@@ -97,14 +101,11 @@ pub struct ExtendedTables<'a> {
 }
 
 impl ExtendedTables<'_> {
-    /// Why a cause is not in a table of this drive, if it is not; `found` in data, if it was.
+    /// Why a cause is not in a table of this drive, if it is not; of the encoder, whether it is that of the output.
     #[must_use]
-    pub(crate) fn left_out(&self, cause: CauseName, found: Option<&FittedCause>) -> Option<&'static str> {
-        let at_output = |found: &FittedCause| {
-            found.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0)
-        };
+    pub(crate) fn left_out(&self, cause: CauseName, at_output: bool) -> Option<&'static str> {
         match cause.spec().in_table {
-            InTable::Yes if found.is_some_and(at_output) => Some(OF_THE_OUTPUT_ENCODER),
+            InTable::Yes if at_output => Some(OF_THE_OUTPUT_ENCODER),
             InTable::Yes => None,
             InTable::AtOneOrientation => {
                 self.orientation_rad.is_none().then_some("the drive is turned against gravity")
@@ -113,21 +114,45 @@ impl ExtendedTables<'_> {
         }
     }
 
-    /// The nominal model as a table; the one given, if one is given.
+    /// The nominal model, with the causes known before, as a table.
     ///
     /// # Errors
-    /// The samples make no table.
-    pub fn nominal(&self, extended: &Extended) -> Result<MadeTable, TableError> {
-        self.make(extended, false)
+    /// The samples make no table; the causes known before cannot be simulated.
+    pub(crate) fn nominal(&self, extended: Option<&Extended>) -> Result<MadeTable, PipelineError> {
+        let of = if self.known.is_some() { "extended model" } else { "nominal model" };
+        self.make(of, |sessions| {
+            let nominal = nominal_arcsec(sessions, self.nominal, self.table, extended).into_iter();
+            nominal.map(|nominal| [nominal.clone(), nominal]).collect()
+        })
     }
 
     /// The extended model as a table, without the causes that have no place there. The zero of the encoder is not in
     /// it.
     ///
     /// # Errors
-    /// The samples make no table.
-    pub(crate) fn extended(&self, extended: &Extended) -> Result<MadeTable, TableError> {
-        self.make(extended, true)
+    /// As [`ExtendedTables::nominal`].
+    pub(crate) fn extended(&self, extended: &Extended) -> Result<MadeTable, PipelineError> {
+        let causes = extended.causes().iter();
+        let left_out: Vec<bool> =
+            causes.map(|cause| self.left_out(cause.name(), cause.at_output()).is_some()).collect();
+        self.make("extended model", |sessions| {
+            let error = |mut series: Series| {
+                for (part, _) in series.cause_arcsec.iter().zip(&left_out).filter(|(_, out)| **out) {
+                    series.extended_arcsec.iter_mut().zip(part).for_each(|(sum, part)| *sum -= part);
+                }
+                [series.nominal_arcsec, series.extended_arcsec]
+            };
+            extended.predict(sessions, self.nominal, self.table).into_iter().map(error).collect()
+        })
+    }
+
+    /// What the causes known before add to each session, arcsec, those aside that have no place in a table.
+    fn known_arcsec(&self, sessions: &[Session]) -> Result<Vec<Vec<f64>>, PipelineError> {
+        let Some((model, sizes)) = self.known else { return Ok(vec![Vec::new(); sessions.len()]) };
+        let mut model = model.clone();
+        let at_output = |cause: &CauseEntry| cause.parameters.get(ParameterName::Encoder.as_str()) == Some(&1.0);
+        model.causes.retain(|cause| self.left_out(cause.name, at_output(cause)).is_none());
+        model.added_arcsec(sessions, sizes).map_err(PipelineError::Known)
     }
 
     fn axes(&self) -> (Vec<f32>, Vec<f32>) {
@@ -146,10 +171,15 @@ impl ExtendedTables<'_> {
         (torques, temperatures)
     }
 
-    fn make(&self, extended: &Extended, with_causes: bool) -> Result<MadeTable, TableError> {
+    /// A table called `of` of what is predicted for sessions: by the nominal model, and in all, arcsec.
+    fn make(
+        &self,
+        of: &str,
+        predicted: impl FnOnce(&[Session]) -> Vec<[Vec<f64>; 2]>,
+    ) -> Result<MadeTable, PipelineError> {
         let (torques, temperatures) = self.axes();
-        let drive = self.core_drive()?;
-        let samples = self.sample(extended, with_causes, &torques, &temperatures);
+        let drive = self.table.map_or_else(|| self.nominal.core_drive(), |table| Ok(*table.drive()))?;
+        let samples = self.sample(predicted, &torques, &temperatures)?;
         let curve = |orders: &'static [u16]| {
             let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
             Harmonics { orders, nodes: NODES_PER_PERIOD * highest }
@@ -166,28 +196,18 @@ impl ExtendedTables<'_> {
             negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
             deviation_limit_rad: f64::from(flexspline::MAX_ERROR_RAD),
         };
-        let of = if with_causes { "extended model" } else { "nominal model" };
         let source =
             Source::File { name: of.to_owned(), blake3: blake3::Hash::from(self.subject.hash).to_hex().to_string() };
-        from_plan(&self.subject.drive, self.subject.hash, self.subject.kind, &plan, &samples, source)
-    }
-
-    fn core_drive(&self) -> Result<flexspline::Drive, TableError> {
-        if let Some(table) = self.table {
-            return Ok(*table.drive());
-        }
-        let refuse = |flexspline, circular_spline, reason: String| TableError::Teeth {
-            drive: self.subject.drive.clone(),
-            flexspline,
-            circular_spline,
-            reason,
-        };
-        let teeth = self.nominal.teeth.ok_or_else(|| refuse(0, 0, "a ratio without teeth".to_owned()))?;
-        teeth.core_drive().map_err(|error| refuse(teeth.flexspline, teeth.circular_spline, error.to_string()))
+        Ok(from_plan(&self.subject.drive, self.subject.hash, self.subject.kind, &plan, &samples, source)?)
     }
 
     /// Steady motion both ways through a whole turn of the output at every node.
-    fn sample(&self, extended: &Extended, with_causes: bool, torques: &[f32], temperatures: &[f32]) -> Vec<Sample> {
+    fn sample(
+        &self,
+        predicted: impl FnOnce(&[Session]) -> Vec<[Vec<f64>; 2]>,
+        torques: &[f32],
+        temperatures: &[f32],
+    ) -> Result<Vec<Sample>, PipelineError> {
         let ratio = self.nominal.ratio;
         // Without teeth there is no mesh.
         let positions = positions(ratio, self.nominal.teeth.map_or(0.5, |teeth| f64::from(teeth.flexspline)));
@@ -207,33 +227,24 @@ impl ExtendedTables<'_> {
                 }
             }
         }
-        let series = extended.predict(&sessions, self.nominal, self.table);
-        let left_out: Vec<bool> =
-            extended.causes().iter().map(|cause| self.left_out(cause.name(), Some(cause)).is_some()).collect();
+        let mut predicted = predicted(&sessions);
+        for ([_, error], known) in predicted.iter_mut().zip(self.known_arcsec(&sessions)?) {
+            error.iter_mut().zip(known).for_each(|(error, known)| *error += known);
+        }
         let mut samples = Vec::new();
         let mut beyond = 0.0;
-        for (((torque, temperature, forward), session), series) in nodes.iter().zip(&sessions).zip(&series) {
+        for (((torque, temperature, forward), session), [nominal, error]) in nodes.iter().zip(&sessions).zip(&predicted)
+        {
             for k in BEFORE..session.len() {
-                let error = if with_causes {
-                    let without: f64 = series
-                        .cause_arcsec
-                        .iter()
-                        .zip(&left_out)
-                        .filter(|(_, out)| **out)
-                        .map(|(part, _)| part[k])
-                        .sum();
-                    series.extended_arcsec[k] - without
-                } else {
-                    series.nominal_arcsec[k]
-                };
-                beyond += error - series.nominal_arcsec[k];
+                let error_arcsec = error[k];
+                beyond += error_arcsec - nominal[k];
                 let generator_rad = session.generator_rad[k];
                 samples.push(Sample {
                     generator_rad,
                     torque_n_m: f64::from(*torque),
                     temperature_c: f64::from(*temperature),
                     direction: if *forward > 0.0 { Direction::Forward } else { Direction::Backward },
-                    output_rad: generator_rad / ratio + error / ARCSEC_PER_RAD,
+                    output_rad: generator_rad / ratio + error_arcsec / ARCSEC_PER_RAD,
                 });
             }
         }
@@ -241,7 +252,7 @@ impl ExtendedTables<'_> {
         // part.
         let zero = beyond / samples.len().max(1) as f64 / ARCSEC_PER_RAD;
         samples.iter_mut().for_each(|sample| sample.output_rad -= zero);
-        samples
+        Ok(samples)
     }
 
     fn steady(&self, turn: f64, positions: usize, torque: f64, temperature: f64, number: usize) -> Session {

@@ -101,6 +101,15 @@ impl Session {
         self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
     }
 
+    /// Generator angle (rad), torque (N·m; 0 if not recorded) and temperature (°C; `temperature_c` if not) row by row.
+    pub(crate) fn states(&self, temperature_c: f64) -> impl Iterator<Item = [f64; 3]> {
+        let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
+        let state = move |(k, generator): (usize, &f64)| {
+            [*generator, at(&self.torque_n_m, k, 0.0), at(&self.temperature_c, k, temperature_c)]
+        };
+        self.generator_rad.iter().enumerate().map(state)
+    }
+
     /// The column of torque or temperature, else that of the orientation.
     fn column_mut(&mut self, channel: Quantity) -> &mut Option<Vec<f64>> {
         match channel {
@@ -132,7 +141,7 @@ impl Session {
     }
 
     /// Leaves out the rows for which `drop` is true.
-    fn leave_out(&mut self, drop: &[bool]) {
+    pub(crate) fn leave_out(&mut self, drop: &[bool]) {
         self.columns_mut().for_each(|values| log::leave_out(values, drop));
         log::leave_out(&mut self.line, drop);
     }
@@ -159,25 +168,30 @@ impl Session {
 /// *Guess*: 1.1°, of which an output behind a ratio of 100 sees 41 arcsec.
 const TURNED_BACK_RAD: f64 = 0.02;
 
+/// Which way an angle last moved by more than `back`, 0 before it first did, and where it turned that way; row by row.
+pub(crate) fn turns(angle: &[f64], back: f64) -> Vec<(f64, f64)> {
+    let Some(&first) = angle.first() else { return Vec::new() };
+    let (mut way, mut farthest, mut turned_at) = (0.0_f64, first, first);
+    let turn = |angle: &f64| {
+        let beyond = (angle - farthest) * if way == 0.0 { 1.0 } else { way };
+        if way == 0.0 && beyond.abs() > back {
+            (way, farthest) = (beyond.signum(), *angle);
+        } else if way != 0.0 && beyond > 0.0 {
+            farthest = *angle;
+        } else if way != 0.0 && -beyond > back {
+            (way, turned_at, farthest) = (-way, farthest, *angle);
+        }
+        (way, turned_at)
+    };
+    angle.iter().map(turn).collect()
+}
+
 /// +1 from where an angle last moved forward by more than its noise, -1 backward.
 pub fn directions(angle: &[f64]) -> Vec<f64> {
-    let Some(&start) = angle.first() else { return Vec::new() };
+    let turns = turns(angle, TURNED_BACK_RAD);
     // The first clear motion also holds for what comes before it.
-    let first = angle.iter().map(|a| a - start).find(|moved| moved.abs() > TURNED_BACK_RAD);
-    let mut now = first.map_or(1.0, f64::signum);
-    let mut farthest = start;
-    angle
-        .iter()
-        .map(|a| {
-            if (a - farthest) * now > 0.0 {
-                farthest = *a;
-            } else if (farthest - a) * now > TURNED_BACK_RAD {
-                now = -now;
-                farthest = *a;
-            }
-            now
-        })
-        .collect()
+    let first = turns.iter().map(|(way, _)| *way).find(|way| *way != 0.0).unwrap_or(1.0);
+    turns.into_iter().map(|(way, _)| if way == 0.0 { first } else { way }).collect()
 }
 
 /// The rows before and after row `k` of a session, or that row at its ends.
@@ -215,6 +229,22 @@ pub struct Recording {
     pub notes: Vec<String>,
     /// Why nothing can be said of the drive from these rows, if so.
     pub unusable: Option<String>,
+}
+
+impl Recording {
+    /// The same file with these sessions, none of its faults told again.
+    #[must_use]
+    pub(crate) fn with_sessions(&self, sessions: Vec<Session>) -> Recording {
+        Recording {
+            file: self.file.clone(),
+            rows: self.rows,
+            sessions,
+            faults: Vec::new(),
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+            unusable: self.unusable.clone(),
+        }
+    }
 }
 
 /// The name of a file in messages, and its bytes.

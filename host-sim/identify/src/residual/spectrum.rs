@@ -68,13 +68,6 @@ pub struct Peak {
     pub named: Vec<NamedOrder>,
 }
 
-impl Peak {
-    /// Whether orders of several parts are within the resolution, so that the line does not say which part makes it.
-    pub fn is_unresolved(&self) -> bool {
-        self.named.len() > 1
-    }
-}
-
 /// Orders of a residual along one angle.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct OrderSpectrum {

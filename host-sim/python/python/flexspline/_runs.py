@@ -363,6 +363,10 @@ class Diagnosis(Fields):
     """``none``, ``explained``, ``partly_explained`` or ``unknown``."""
     finding: str
     """``fault_found``, ``nothing_found``, ``not_understood`` or ``data_unusable``."""
+    table: Fields
+    """Which table was made, and why: kind (``extended``, ``calibrated`` or ``none``), file, rms_left_out_arcsec, why."""
+    hints: list[Fields]
+    """Causes that gain too little to be named: name, gain, why_not_a_cause."""
     causes: list[Fields]
     """Strongest first: name, confidence, parameters (value, std), held_out_gain, size_arcsec, look_alikes."""
     data_faults: list[Fields]
@@ -373,7 +377,7 @@ class Diagnosis(Fields):
     drive_toml: str | None
     """The extended drive or model with the causes; None where none was found."""
     extended_table: Table | None
-    """The table that holds the causes, where it leaves less error than the nominal one in sessions held out."""
+    """The table that leaves least in rows left out: of the causes, or calibrated (``table.kind``); None where none gains."""
     explanation: str | None
     """Why the cause of ``explain`` was named or not."""
 
@@ -382,7 +386,7 @@ class Diagnosis(Fields):
         self.rows, self.drive_toml, self.extended_table, self.explanation = rows, drive_toml, table, explanation
 
     def save(self, folder: PathLike) -> list[Path]:
-        """Writes ``diagnosis.json``, and where causes were found ``drive-extended.toml`` and the extended table; gives what was written."""
+        """Writes ``diagnosis.json``, where causes were found ``drive-extended.toml``, and the table; gives what was written."""
         into = Path(folder)
         into.mkdir(parents=True, exist_ok=True)
         written = [into / "diagnosis.json"]
@@ -391,7 +395,7 @@ class Diagnosis(Fields):
             written.append(into / "drive-extended.toml")
             written[1].write_text(self.drive_toml, encoding="utf-8")
         if self.extended_table is not None:
-            written.extend(self.extended_table._save_as(into, f"{self.extended_table.generator}-extended"))
+            written.extend(self.extended_table._save_as(into, self.table.file.removesuffix(".fxt")))
         return written
 
     def plot(self, ax: Axes | None = None) -> Axes:

@@ -25,7 +25,7 @@ use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
 use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Unexplained, Verdict};
 use flexspline_identify::diagnosis::rows::Rows;
-use flexspline_identify::diagnosis::{Extended, Series};
+use flexspline_identify::diagnosis::{Extended, Series, WrittenTable};
 use flexspline_identify::measurement::{Fault, Gear, Recording, Session, ToothStep};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::Picture;
@@ -88,6 +88,8 @@ pub struct DiagnosisSources<'a> {
     pub nominal: &'a Nominal,
     /// The diagnosis.
     pub diagnosis: &'a Diagnosis,
+    /// The table that it ends in.
+    pub table: &'a WrittenTable,
     /// The residual of each model; the nominal model first.
     pub levels: Vec<Level>,
     /// The contribution of each cause.
@@ -270,16 +272,14 @@ impl DiagnosisKnown<'_> {
         Headline::new(answer, number, number_is)
     }
 
-    /// Faults of the data, a sentence each, and steps of whole teeth.
+    /// The table, faults of the data, a sentence each, and steps of whole teeth.
     fn remarks(&self) -> Vec<String> {
         const FIRST: usize = 5;
         let recording = self.sources.recording;
-        let mut remarks: Vec<String> = recording
-            .faults
-            .iter()
-            .take(FIRST)
-            .map(|fault| format!("Data fault: {}; {}.", words::of(&fault.name), fault.what.trim_end_matches('.')))
-            .collect();
+        let mut remarks = vec![format!("{}.", self.sources.table.text().replacen("table:", "Table:", 1))];
+        let fault =
+            |fault: &Fault| format!("Data fault: {}; {}.", words::of(&fault.name), fault.what.trim_end_matches('.'));
+        remarks.extend(recording.faults.iter().take(FIRST).map(fault));
         if recording.faults.len() > FIRST {
             remarks.push(format!("{} more data faults are in the table below.", recording.faults.len() - FIRST));
         }
@@ -423,7 +423,10 @@ impl DiagnosisKnown<'_> {
                 line("none", none),
                 line("nominal tables", compensation.rms_nominal_tables_arcsec),
                 line(&format!("extended tables, in {}", self.left_out()), compensation.rms_extended_tables_arcsec),
-            ],
+            ]
+            .into_iter()
+            .chain(compensation.rms_calibrated_table_arcsec.map(|left| line("calibrated table", left)))
+            .collect(),
         );
         // The number that a joint feels, then what is behind it.
         let mut blocks = vec![pointing, all, noise];
@@ -651,13 +654,13 @@ mod tests {
                 rows_averaged: 1,
             },
             held_out: HeldOut { rms_before_arcsec: 10.0, rms_after_arcsec: 5.0 },
+            hints: Vec::new(),
             compensation: Compensation::default(),
             unexplained: vec![Unexplained { looks_like: "slow motion".into(), size_arcsec: 30.0 }],
             recalibrated: BTreeMap::new(),
             noise_arcsec: [5.0, 0.0],
             wander_correlation_s: 1.0,
             next_experiment: None,
-            ratio_proposed: None,
             experiment_for_asked: None,
             zeros: Vec::new(),
             set_aside: None,
@@ -673,6 +676,7 @@ mod tests {
             recording: &recording,
             nominal: &nominal,
             diagnosis,
+            table: &WrittenTable::default(),
             levels: vec![level],
             parts: Vec::new(),
             command: "flexspline diagnose",
@@ -739,6 +743,7 @@ mod tests {
         evaluated.compensation = Compensation {
             rms_uncompensated_arcsec: 20.0,
             rms_nominal_tables_arcsec: 8.0,
+            rms_calibrated_table_arcsec: None,
             rms_extended_tables_arcsec: 3.0,
         };
         assert_eq!(words(&page_of(&evaluated, Vec::new()).headlines[0].number), "8″ → 3″");

@@ -299,7 +299,7 @@ fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
         plays.push(on.base.law);
     }
     let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
-    let on_sample = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
+    let on_sample = thinned.as_ref().map_or(*on, |thinned| on.over(&thinned.rows, &thinned.base));
     let of = |sign, play: PlayLaw| gravity_torque(sign, play, on, &on_sample).variant(play.as_str());
     let both = |play| [Some(of(1.0, play)), on.is_turned_about().then(|| of(-1.0, play).counted_back())];
     plays.into_iter().flat_map(both).flatten().collect()

@@ -100,11 +100,14 @@ pub fn line(per: Per, order: f64) -> Law {
     })
 }
 
+/// Arcsec of an offset in a row, but for its size.
+type Offset = fn(&Excitation<'_>, usize) -> f64;
+
 /// Everything without a name that is always tried.
 #[must_use]
 pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     let (warm, timed, loaded) = (on.rows.recorded.temperature, on.rows.recorded.time, on.scales.load > 0.0);
-    let offsets: [(bool, &'static str, fn(&Excitation<'_>, usize) -> f64); 13] = [
+    let offsets: [(bool, &'static str, Offset); 13] = [
         (warm, "offset with temperature", warmer),
         (warm, "offset with temperature squared", |on, k| warmer(on, k).powi(2)),
         (timed, "offset with time", since_begin),

@@ -26,11 +26,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::base::Base;
-use super::linear::Prior;
 use super::prepare::{Jump, whole_pitches};
 use super::rows::Rows;
 use super::thresholds::selection::AFTER_WHEELS;
 use crate::causes::{CauseName, Kin, Need, ParameterName};
+use crate::linear::Prior;
 use crate::nominal::Nominal;
 use flexspline_base::robust::least_and_most;
 use flexspline_design::kernels::Kernels;
@@ -85,6 +85,12 @@ impl<'a> Excitation<'a> {
     #[must_use]
     pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a LawUnits) -> Excitation<'a> {
         Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
+    }
+
+    /// Other rows, with the nominal model over them, and nothing that other causes change.
+    #[must_use]
+    pub(crate) fn over(&self, rows: &'a Rows, base: &'a Base) -> Excitation<'a> {
+        Excitation { rows, base, ..*self }
     }
 
     /// Whether the output is not loaded beyond friction, which then says nothing of the flank that carries.

@@ -21,6 +21,48 @@ pub(crate) struct Gram {
 }
 
 impl Gram {
+    /// Of no rows.
+    #[must_use]
+    pub fn none(size: usize) -> Gram {
+        Gram { size, products: vec![0.0; size * size] }
+    }
+
+    /// Adds a row, the value last, that counts `weight` times: to the lower triangle.
+    pub fn add_row(&mut self, row: &[f64], weight: f64) {
+        for (i, (products, a)) in self.products.chunks_exact_mut(self.size).zip(row).enumerate() {
+            products.iter_mut().zip(&row[..=i]).for_each(|(sum, b)| *sum += weight * a * b);
+        }
+    }
+
+    /// Of some of the columns; the lower triangle is read.
+    #[must_use]
+    pub fn among(&self, places: &[usize]) -> Gram {
+        let mut products = Vec::with_capacity(places.len() * places.len());
+        for i in places {
+            products.extend(places.iter().map(|j| self.at(*i.max(j), *i.min(j))));
+        }
+        Gram { size: places.len(), products }
+    }
+
+    /// Without the first column, whose coefficient is free in these rows; the lower triangle is read.
+    #[must_use]
+    pub fn first_free(&self) -> Gram {
+        let mut own = self.clone();
+        if self.at(0, 0) > 0.0 {
+            let first: Vec<f64> = (0..self.size).map(|k| self.at(k, 0)).collect();
+            own.add_row(&first, -1.0 / self.at(0, 0));
+        }
+        own.among(&(1..self.size).collect::<Vec<usize>>())
+    }
+
+    /// Sum of squares that the columns leave with these coefficients.
+    #[must_use]
+    pub fn left_by(&self, coefficients: &[f64]) -> f64 {
+        let all: Vec<f64> = coefficients.iter().copied().chain([-1.0]).collect();
+        let rows = self.products.chunks_exact(self.size);
+        rows.zip(&all).map(|(products, c)| c * dot(products, &all)).sum::<f64>().max(0.0)
+    }
+
     /// Products of `columns`, whose last is the data, over a range of rows.
     #[must_use]
     pub fn of(columns: &[&[f64]], range: Range<usize>) -> Gram {
