@@ -656,7 +656,7 @@ fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Optio
         (false, true) => "which column is the generator",
         _ => "which columns are generator and output",
     };
-    notes.push(format!("{what} does not show: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
+    notes.push(format!("{what} is not known: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
     None
 }
 

@@ -51,8 +51,8 @@ pub(super) struct Said {
     pub joint: Option<u32>,
 }
 
-/// The meaning of a name, and of the unit that stands in a line of its own if there is one. Units count before words: a load in
-/// N·m is a torque, whatever it is called.
+/// The meaning of a name, and of the unit that stands in a line of its own if there is one. Units count before words: a
+/// load in N·m is a torque, whatever it is called.
 pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
     let words = words(name);
     let is = |known: &str| words.iter().any(|word| word == known);

@@ -228,9 +228,13 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut
 mod tests {
     use super::super::{DrawnUnit, MotionPlan, Sensors, Sizes, catalogue_drive, parse, synthesize};
     use super::*;
-    use crate::measurement::{ColumnMap, Gear, parse as read};
+    use crate::measurement::{ColumnMap, Gear, MeasuredError, Recording, parse as read};
 
-    fn recording(effect: &str) -> crate::measurement::Recording {
+    fn recording(effect: &str) -> Recording {
+        read_back(effect).unwrap()
+    }
+
+    fn read_back(effect: &str) -> Result<Recording, MeasuredError> {
         let nominal = catalogue_drive();
         let plan = MotionPlan { sessions: 8, rows: 1500, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0 };
         let mut random = fastrand::Rng::with_seed(5);
@@ -241,7 +245,7 @@ mod tests {
         let hidden = [parse(effect).unwrap()];
         let made = synthesize((&nominal, None), sizes, &hidden, motion, &sensors, &unit, &mut random).unwrap();
         let text = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
-        read("data.csv", text.as_bytes(), &ColumnMap::default(), &Gear::of_teeth(188, 190, true)).unwrap()
+        read("data.csv", text.as_bytes(), &ColumnMap::default(), &Gear::of_teeth(188, 190, true))
     }
 
     #[test]
@@ -261,7 +265,6 @@ mod tests {
             ("missing_samples", FaultName::MissingSamples),
             ("clock_error", FaultName::ClockError),
             ("outliers", FaultName::Outliers),
-            ("unit_mismatch", FaultName::UnitMismatch),
             ("quantisation", FaultName::Quantisation),
             ("drift:arcsec_per_hour=300", FaultName::Drift),
             ("read_jitter:jitter_ms=2", FaultName::ReadJitter),
@@ -272,6 +275,8 @@ mod tests {
             let found: Vec<FaultName> = recording(effect).faults.iter().map(|fault| fault.name).collect();
             assert!(found.contains(&name), "{effect}: {found:?}");
         }
+        let refused = read_back("unit_mismatch").unwrap_err().to_string();
+        assert!(refused.contains("--columns output=output_rad:deg"), "{refused}");
         // Where the load crosses zero for a row, the flank changes for a row: that is taken for an outlier, and nothing
         // else is.
         assert!(recording("wear").faults.iter().all(|f| f.name == FaultName::Outliers && f.rows < 60));

@@ -35,10 +35,11 @@ const JITTER_OVER_MOTION: f64 = 5.0;
 const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
 /// Generator speeds that exist, up to 20 000 turns a minute, rad/s. *Guess*: motors of such drives turn no faster.
 const FASTEST_RAD_S: f64 = 2100.0;
-/// Rows farther apart than this (s), for longer than this altogether (s), in which a motor that goes to and fro stays
-/// slower than this (rad/s), look like milliseconds read as seconds: a bench creeps for minutes, not for hours, and a
-/// telescope creeps for nights, but one way. *Guess*.
-const CREEPS: (f64, f64, f64) = (0.9, 3600.0, 0.15);
+/// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this
+/// (rad/s), may be milliseconds read as seconds: a bench creeps for minutes, not for days. *Guess*.
+const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
+/// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
+const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
 /// It goes to and fro where each direction has this share of the way, and this way at least, rad. *Guess*: one motor
 /// turn.
 const EACH_WAY: (f64, f64) = (0.1, 6.0);
@@ -291,7 +292,7 @@ fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findin
     let (speed, fastest) = (median_of(&mut speeds), quantile_of(&mut speeds, 0.95));
     let lasts_s = period * time.len() as f64;
     let column = columns.iter().find(|column| column.quantity == Quantity::Time && !column.said);
-    let creeps = column.filter(|_| period > CREEPS.0 && lasts_s > CREEPS.1 && fastest < CREEPS.2);
+    let slower = |limits: (f64, f64, f64)| period > limits.0 && lasts_s > limits.1 && fastest < limits.2;
     let moves = || (1..time.len()).filter(|row| log.continues(*row)).map(|row| turned(generator, row));
     let way = |sign: f64| moves().map(|by| (sign * by).max(0.0)).sum::<f64>();
     let (there, back) = (way(1.0), way(-1.0));
@@ -300,7 +301,7 @@ fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findin
     let changes = (2..time.len()).filter(|row| log.continues(*row) && log.continues(row - 1));
     let change = changes.map(|row| (turned(generator, row) - turned(generator, row - 1)).abs()).fold(0.0, f64::max);
     let smoothly = change < SMOOTHLY * fastest * period;
-    if let Some(column) = creeps.filter(|_| to_and_fro && smoothly) {
+    if let Some(column) = column.filter(|_| to_and_fro && smoothly && slower(CREEPS_TO_AND_FRO)) {
         let (column, rows, hours) = (column.name.clone(), time.len(), lasts_s / 3600.0);
         return Err(Refusal::Milliseconds { column, rows, period, hours, speed: fastest });
     }
@@ -308,6 +309,8 @@ fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findin
         format!("a sample period of {period:e} s is not plausible")
     } else if speed > FASTEST_RAD_S {
         format!("a generator speed of {speed:.0} rad/s is not plausible")
+    } else if column.is_some() && slower(CREEPS) {
+        format!("{} rows {period:.3} s apart, in which the generator hardly exceeds {fastest:.3} rad/s", time.len())
     } else {
         return Ok(());
     };
