@@ -24,9 +24,10 @@
 //! An imperfect drive does not repeat from tooth to tooth any more. What still does, with period `2 pi / z_f` in the
 //! generator angle: any generator (a constant shape), uniform wear, a difference in temperature.
 
+use super::sleeve::{Choice, choice};
 use super::spec::Drive;
 use crate::toml_file::Problem;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::f64::consts::PI;
 
 /// Imperfections of a drive as built; all zero or empty is the ideal drive. Field names are the keys of `[as_built]`.
@@ -112,46 +113,25 @@ pub(super) fn sum_at(harmonics: &[Harmonic], angle_rad: f64) -> f64 {
     harmonics.iter().map(|harmonic| harmonic.at(angle_rad)).sum()
 }
 
-/// A wheel of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Wheel {
-    /// The external one.
-    Flexspline,
-    /// The internal one.
-    CircularSpline,
-}
-
-impl Wheel {
-    /// Its name in a file.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Wheel::Flexspline => "flexspline",
-            Wheel::CircularSpline => "circular_spline",
-        }
+choice! {
+    /// A wheel of the drive.
+    Wheel {
+        /// The external one.
+        Flexspline = "flexspline",
+        /// The internal one.
+        CircularSpline = "circular_spline",
     }
 }
 
-/// Flanks of a tooth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DamagedFlank {
-    /// The one on the counter-clockwise side of the tooth.
-    Plus,
-    /// The one on its clockwise side.
-    Minus,
-    /// Both.
-    Both,
-}
-
-impl DamagedFlank {
-    /// Its name in a file.
-    pub const fn name(self) -> &'static str {
-        match self {
-            DamagedFlank::Plus => "plus",
-            DamagedFlank::Minus => "minus",
-            DamagedFlank::Both => "both",
-        }
+choice! {
+    /// Flanks of a tooth.
+    DamagedFlank {
+        /// The one on the counter-clockwise side of the tooth.
+        Plus = "plus",
+        /// The one on its clockwise side.
+        Minus = "minus",
+        /// Both.
+        Both = "both",
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::as_built::{AsBuilt, DamagedFlank, Harmonic, Wheel};
 use super::error::DriveError;
-use super::fields::{self, Value};
+use super::fields::{self, Slot};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
 use super::sleeve::{Bottom, FaceLoad, Profile, Sleeve, SleeveKind};
@@ -526,9 +526,9 @@ impl Drive {
     pub fn hash(&self) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"flexspline drive 1\n");
-        fields::for_each(self, |field, value| {
+        fields::for_each(self, |field, slot| {
             // an imperfection that is not there leaves the hash of the ideal drive, and so does a face that is straight
-            if (field.is_imperfection() || field.is_of_the_face() || field.is_of_the_profile()) && value.is_zero() {
+            if (field.is_imperfection() || field.is_of_the_face() || field.is_of_the_profile()) && slot.is_zero() {
                 return;
             }
             // and so do the sizes of a sleeve that springs stand for
@@ -540,23 +540,24 @@ impl Drive {
             let number = |hasher: &mut blake3::Hasher, number: f64| {
                 hasher.update(&(number + 0.0).to_le_bytes());
             };
-            let mark: &[u8] = if *value == Value::Rigid { b" rigid" } else { b"=" };
+            let mark: &[u8] = if matches!(slot, Slot::RealOrRigid(None)) { b" rigid" } else { b"=" };
             hasher.update(mark);
-            match value {
-                Value::Number(x) => number(&mut hasher, *x),
-                Value::Rigid => {}
-                Value::Word { chosen, .. } => {
-                    hasher.update(chosen.as_bytes());
+            match slot {
+                Slot::Real(x) => number(&mut hasher, *x),
+                Slot::RealOrRigid(x) => x.iter().for_each(|x| number(&mut hasher, *x)),
+                Slot::Count(x) => number(&mut hasher, f64::from(*x)),
+                Slot::Word(word) => {
+                    hasher.update(word.chosen().as_bytes());
                 }
-                Value::List(list) => list.iter().for_each(|x| number(&mut hasher, *x)),
-                Value::Harmonics(list) => {
+                Slot::List(list) => list.iter().for_each(|x| number(&mut hasher, *x)),
+                Slot::Harmonics(list) => {
                     for harmonic in list {
                         hasher.update(&harmonic.order.to_le_bytes());
                         number(&mut hasher, harmonic.amplitude_um);
                         number(&mut hasher, harmonic.phase_deg);
                     }
                 }
-                Value::Damage(list) => {
+                Slot::Damage(list) => {
                     for tooth in list {
                         let wheel = u8::from(tooth.wheel == Wheel::CircularSpline);
                         let flank = match tooth.flank {
@@ -585,8 +586,8 @@ impl Drive {
     /// The same with these generators alone: what the others lack room for is no problem.
     pub(crate) fn check_with(&self, kinds: &[GeneratorKind]) -> Result<(), DriveError> {
         let mut problems = Vec::new();
-        fields::for_each(self, |field, value| {
-            for (at, number, range) in fields::ranged(field, value) {
+        fields::for_each(self, |field, slot| {
+            for (at, number, range) in slot.ranged(&field.range) {
                 if let Some(what) = range.refusal(number) {
                     problems.push(Problem::of(&format!("{}{at}", field.path), what));
                 }
