@@ -263,17 +263,6 @@ impl<'p> Motion<'p> {
         while self.settle_on(step_rad)? {}
         Ok(())
     }
-
-    /// Settles in the sense of `sense` (+1 or −1), then turns by one flexspline pitch; the place at the end of each of
-    /// its increments.
-    ///
-    /// # Errors
-    /// No equilibrium; or the drive does not settle.
-    pub fn settled_pitch(&mut self, sense: f64, increments: usize) -> Result<Vec<SettledPlace>, SolveError> {
-        let turn = sense * self.pitch();
-        self.settle(turn / increments as f64)?;
-        self.turn_in(turn, increments)
-    }
 }
 
 impl Travel {
