@@ -247,19 +247,6 @@ impl Sleeve {
             );
         }
     }
-
-    /// Its lengths, for whoever scales them.
-    pub(super) fn lengths(&mut self) -> [&mut f64; 7] {
-        [
-            &mut self.wall_mm,
-            &mut self.flange_side_mm,
-            &mut self.bottom_side_mm,
-            &mut self.bottom_thickness_mm,
-            &mut self.diaphragm_thickness_mm,
-            &mut self.diaphragm_width_mm,
-            &mut self.hub_radius_mm,
-        ]
-    }
 }
 
 #[cfg(test)]

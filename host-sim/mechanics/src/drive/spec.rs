@@ -489,31 +489,17 @@ impl Drive {
     fn in_thermal_state(&self, new: ThermalState) -> Drive {
         let mut drive = self.clone();
         let (t, old, rise) = (&self.temperature, self.thermal_state, new.above_reference_k);
-        let f = &mut drive.flexspline;
-        for length in [
-            &mut f.module_mm,
-            &mut f.root_radius_mm,
-            &mut f.tip_radius_mm,
-            &mut f.rim_thickness_mm,
-            &mut f.width_mm,
-            &mut f.root_fillet_mm,
-            &mut f.tip_rounding_mm,
-        ] {
-            *length *= new.flexspline_scale / old.flexspline_scale;
-        }
-        for length in drive.sleeve.lengths() {
-            *length *= new.flexspline_scale / old.flexspline_scale;
-        }
-        let c = &mut drive.circular_spline;
-        for length in [
-            &mut c.module_mm,
-            &mut c.root_radius_mm,
-            &mut c.tip_radius_mm,
-            &mut c.outer_radius_mm,
-            &mut c.root_fillet_mm,
-            &mut c.tip_rounding_mm,
-        ] {
-            *length *= new.circular_spline_scale / old.circular_spline_scale;
+        for field in fields::ALL {
+            let (section, key) = field.split();
+            let scale = match section {
+                "flexspline" | "sleeve" => new.flexspline_scale / old.flexspline_scale,
+                "circular_spline" => new.circular_spline_scale / old.circular_spline_scale,
+                _ => continue,
+            };
+            let is_length = key.ends_with("_mm") && !key.ends_with("_per_mm");
+            if let (true, Slot::Real(length)) = (is_length, field.slot(&mut drive)) {
+                *length *= scale;
+            }
         }
         drive.material.youngs_modulus_mpa *=
             (1.0 + t.youngs_modulus_per_k * rise) / (1.0 + t.youngs_modulus_per_k * old.above_reference_k);
