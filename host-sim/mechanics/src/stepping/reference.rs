@@ -190,11 +190,7 @@ impl Wheels for SparseWheels<'_> {
             values[yy] += contact.stiffness[row_y + 2 * a + 1];
             for b in 0..a {
                 let p = bore_positions[contact.edge][a * (a - 1) / 2 + b].expect("bore nodes share an element");
-                let (base, row, column) = (p.base as usize, p.row as usize, p.column as usize);
-                values[base] += contact.stiffness[row_x + 2 * b];
-                values[base + column] += contact.stiffness[row_x + 2 * b + 1];
-                values[base + row] += contact.stiffness[row_y + 2 * b];
-                values[base + row + column] += contact.stiffness[row_y + 2 * b + 1];
+                p.add(|i, j| contact.stiffness[[row_x, row_y][i] + 2 * b + j], values);
             }
         }
     }
@@ -210,12 +206,7 @@ impl Wheels for SparseWheels<'_> {
             values[yy] += contact.stiffness[(2 * a + 1) * n + 2 * a + 1];
         }
         for &(a, b, p) in &positions.blocks {
-            for i in 0..2 {
-                for j in 0..2 {
-                    let position = p.base as usize + i * p.row as usize + j * p.column as usize;
-                    values[position] += contact.stiffness[(2 * a + i) * n + 2 * b + j];
-                }
-            }
+            p.add(|i, j| contact.stiffness[(2 * a + i) * n + 2 * b + j], values);
         }
     }
 
