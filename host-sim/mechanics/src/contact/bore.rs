@@ -61,8 +61,6 @@ pub struct BorePressure {
     pub moment: f64,
     /// Largest pressure (MPa) and where it acts.
     pub peak: f64,
-    /// Energy stored in the penalty (N mm/mm).
-    pub energy: f64,
 }
 
 impl BoreContact {
@@ -147,8 +145,7 @@ impl BoreContact {
                 open.until[edge] = open.moved + bound;
                 continue;
             }
-            let mut contact =
-                BorePressure { edge, force: [0.0; 6], stiffness: [0.0; 21], moment: 0.0, peak: 0.0, energy: 0.0 };
+            let mut contact = BorePressure { edge, force: [0.0; 6], stiffness: [0.0; 21], moment: 0.0, peak: 0.0 };
             let mut touching = false;
             let places = &self.point_places[edge * self.points.len()..];
             for ((weight, n), place) in self.points.iter().zip(places) {
@@ -164,7 +161,6 @@ impl BoreContact {
                 let pressure = -law.stiffness * foot.distance;
                 let load = pressure * weight;
                 contact.peak = contact.peak.max(pressure);
-                contact.energy -= 0.5 * load * foot.distance;
                 let f = [load * foot.normal[0], load * foot.normal[1]];
                 contact.moment += x[0] * f[1] - x[1] * f[0];
                 // Hessian of the penalty energy: normal stiffness and, from the curvature of the outline, a small
