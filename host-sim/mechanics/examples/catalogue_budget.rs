@@ -27,8 +27,8 @@ use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Face, Method, Problem, SolveError, SolverSettings};
 
-/// What the catalogue has (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting torque of Schaeffler's RT1,
-/// same sizes).
+/// Values of the catalogue (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting torque of Schaeffler's
+/// RT1, same sizes).
 struct Catalogue {
     size: u32,
     /// T1, T2 and the rated torque, N·m.
@@ -43,7 +43,7 @@ const CATALOGUE: [Catalogue; 3] = [
     Catalogue { size: 40, loads_n_m: [54.0, 196.0, 265.0], k_n_m_per_rad: [1.3e5, 2.0e5, 2.3e5], start_n_m: None },
 ];
 
-/// What no maker publishes.
+/// Numbers that no maker publishes.
 #[derive(Clone, Copy)]
 struct Guess {
     /// Length and wall of the cup over its pitch diameter: about half as long as wide, the wall about a hundredth.
@@ -66,7 +66,7 @@ const GUESS: Guess =
 const BOTTOM: [f64; 2] = [2.0, 0.5];
 /// Flank friction: greased steel.
 const FRICTION: f64 = 0.08;
-/// Load at which the width of the loop is told, over the rated one: above the drag, below T1.
+/// Load at which the width of the loop is reported, over the rated one: above the drag, below T1.
 const LOOP_SHARE: f64 = 0.04;
 /// Pairs of flanks nearer than this are looked at, mm.
 const NEAR_MM: f64 = 0.02;
@@ -180,13 +180,13 @@ fn loop_arcsec(drive: &Drive, rated_n_m: f64, share: f64) -> Result<f64, SolveEr
     let problem = problem(&rough(drive))?;
     let mut motion = Motion::deformed(&problem, 0.0)?;
     let light = share * rated_n_m;
-    let mut told = [0.0; 2];
-    for (told, before) in told.iter_mut().zip([rated_n_m, -rated_n_m]) {
+    let mut errors_rad = [0.0; 2];
+    for (error_rad, before) in errors_rad.iter_mut().zip([rated_n_m, -rated_n_m]) {
         motion.load(before)?;
         motion.load(light)?;
-        *told = motion.error_rad();
+        *error_rad = motion.error_rad();
     }
-    Ok((told[0] - told[1]) * ARCSEC_PER_RAD)
+    Ok((errors_rad[0] - errors_rad[1]) * ARCSEC_PER_RAD)
 }
 
 fn rough(drive: &Drive) -> Drive {

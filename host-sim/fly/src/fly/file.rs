@@ -202,7 +202,7 @@ fn read_table(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Flown> {
             file.take(path, to.take(value));
         }
     }
-    // What several fields decide together.
+    // Limits on several fields together.
     let scenario = &flown.scenario;
     let mut refuse = |path: &str, what: String| match at(table, path) {
         Some(value) => file.refuse(value.span(), path, what),

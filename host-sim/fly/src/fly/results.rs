@@ -258,7 +258,7 @@ fn way_out(flight: &Flight, scenario: &Scenario) -> String {
 /// Paces of speed, position and integral with which the servo's loop is sound: the fewest changed, and those least.
 fn sound_paces(joint: &TwoMasses, servo: &ServoSettings) -> Option<[f64; 3]> {
     let paces = [servo.speed_hz, servo.position_hz, servo.integral_hz];
-    // What is printed is what is judged.
+    // The printed value is the judged one.
     let changed = |hz: f64, steps: i32| match steps {
         0 => hz,
         _ => format!("{:.1e}", hz * STEP.powi(steps)).parse().unwrap_or(hz),

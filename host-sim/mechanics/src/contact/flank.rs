@@ -11,7 +11,7 @@
 //! spline, so that action equals reaction and the moment on the output is that of the forces themselves.
 //!
 //! As built ([`FlankDeviations`]) the point becomes that of a tooth displaced as a rigid body, and P(s) the outline of
-//! a space displaced likewise; the axis of the circular spline may stand beside that of the housing, and a worn flank
+//! a space displaced likewise; the axis of the circular spline may be offset from that of the housing, and a worn flank
 //! adds its depth to g. All are constants, so that c and its work stay what they were. The frame that turns with the
 //! circular spline has its origin on the axis of the output bearing: `x` counts from there, and the torque on the
 //! output is the moment about it, wherever toothing and housing have theirs.
@@ -134,8 +134,8 @@ pub struct PairContribution {
     pub along_face: Option<AlongFace>,
 }
 
-/// A point of a pair that bears: its place along the flank, how far from the axis of the circular spline it and its foot
-/// stand, mm, and the arc length of the foot.
+/// A point of a pair that bears: its place along the flank, how far from the axis of the circular spline it and its
+/// foot stand, mm, and the arc length of the foot.
 struct BearingPoint {
     place: FacePoint,
     radius: f64,
@@ -240,7 +240,7 @@ impl LocalField {
 }
 
 impl<'a> FlankContact<'a> {
-    /// Contact between the flanks of two meshes, the flanks standing beside their nominal places by `deviations`.
+    /// Contact between the flanks of two meshes, the flanks offset from their nominal places by `deviations`.
     pub fn new(
         fs_mesh: &'a WheelMesh,
         cs_mesh: &'a WheelMesh,

@@ -143,7 +143,7 @@ impl FewNumbers {
         );
         put(drive, "circular_spline.tip_radius_mm", outer + TIP * m, format!("pitch radius + {TIP} modules"));
         let outer_mm = outer * like.circular_spline.outer_radius_mm / (pitch_radius_mm + like.flexspline.module_mm);
-        // Fewer teeth are larger beside the ring.
+        // Fewer teeth are larger in proportion to the ring.
         let outer_mm = outer_mm.max(drive.circular_spline.root_radius_mm + 4.0 * m);
         put(
             drive,

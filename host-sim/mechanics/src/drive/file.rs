@@ -250,7 +250,7 @@ impl DriveReader<'_> {
         };
         for (key, value) in table {
             let section = key.get_ref().as_ref();
-            // What a diagnosis found that no field holds stands in [extension], what a catalogue says in [data_sheet]:
+            // [extension] holds findings of a diagnosis that are no fields, [data_sheet] values of a catalogue:
             // others read them.
             if ["base", "name", "extension", "data_sheet"].contains(&section) {
                 continue;

@@ -313,7 +313,7 @@ impl RigidMesh {
                 let space = (tooth as i64 + lobe as i64).rem_euclid(spaces as i64) as usize;
                 let from_lobe = phi - PI * lobe;
                 let axis = psi + PI * lobe + from_lobe * self.flexspline_teeth / self.circular_spline_teeth;
-                let beside = moved.spaces[space];
+                let space_at = moved.spaces[space];
                 let of_axis = rotate(moved.axis, (-axis).sin_cos());
                 let of_generator = rotate(eccentric, (psi - axis).sin_cos());
                 let mut out = 1e-3 * sum_at(&built.rim_thickness_harmonics, TAU * tooth as f64 / teeth as f64)
@@ -321,13 +321,13 @@ impl RigidMesh {
                 if generator == GeneratorKind::Cam {
                     out += 1e-3 * sum_at(&built.cam_form_harmonics, phi);
                 }
-                let radial = at.translation[0] - beside.translation[0] - of_axis[0] + of_generator[0] + out;
+                let radial = at.translation[0] - space_at.translation[0] - of_axis[0] + of_generator[0] + out;
                 for side in Side::BOTH {
                     let Some(nearest) = at_phase(&cycles[side.index()], from_lobe) else { continue };
                     let r = nearest.radius_mm;
-                    let along = at.translation[1] - beside.translation[1] - of_axis[1]
+                    let along = at.translation[1] - space_at.translation[1] - of_axis[1]
                         + of_generator[1]
-                        + r * (at.turn.0 - beside.turn.0);
+                        + r * (at.turn.0 - space_at.turn.0);
                     let k = side.index();
                     let missing = moved.tooth_depth[tooth][k] + moved.space_depth[space][k];
                     let gap = nearest.gap_rad + nearest.by_radius * radial - side.sign() * along / r
@@ -409,7 +409,7 @@ mod tests {
         RigidMesh::new(drive, kind).unwrap().report(kind).unwrap()
     }
 
-    /// An ideal drive has the room of its backlash at the tightest phase. A spline beside its axis, or an oval one,
+    /// An ideal drive has the room of its backlash at the tightest phase. A spline off its axis, or an oval one,
     /// presses teeth into their spaces: the room falls by twice what the flank's lean makes of the displacement, or
     /// more; wear opens it by its depth on both flanks of both wheels.
     #[test]

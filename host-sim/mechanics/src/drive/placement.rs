@@ -1,4 +1,4 @@
-//! Where the flanks of an as-built drive stand beside those of the ideal one.
+//! Offsets of the flanks of an as-built drive from those of the ideal one.
 //!
 //! Teeth and spaces are rigid bodies of their own here: each is turned about the axis of its wheel and then displaced,
 //! in the frame that has the axis of the ideal tooth or space along +x. What is worn or broken off a flank opens the
@@ -69,7 +69,7 @@ pub struct FlankDeviations {
     /// Axis that the circular spline turns about, in the housing, mm. Its torque is the moment about this axis: that of
     /// its own bearing.
     pub axis: [f64; 2],
-    /// No point of a flank stands further beside its ideal place than this, mm; both wheels and the axis together.
+    /// No point of a flank is further from its ideal place than this, mm; both wheels and the axis together.
     pub largest: f64,
 }
 

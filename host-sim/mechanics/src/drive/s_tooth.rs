@@ -265,7 +265,7 @@ mod tests {
             let r = 48.66 + 0.01 * f64::from(k);
             let (angle, _) = cycle.envelope(r).unwrap();
             let foot = chain.foot([r * angle.cos(), r * angle.sin()]);
-            assert!(foot.left.abs() < 1e-5, "{} mm beside the envelope at {r}", foot.left);
+            assert!(foot.left.abs() < 1e-5, "{} mm off the envelope at {r}", foot.left);
         }
     }
 

@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A harmonic drive: flexspline fixed, circular spline the output, two waves.
 ///
-/// Nominal sizes, and what the drive as built has beside them. Field names are the keys of the file.
+/// Nominal sizes, and the deviations of the drive as built from them. Field names are the keys of the file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drive {
     /// A label for reports; no part of the physics.
@@ -328,12 +328,12 @@ impl Drive {
     ///
     /// Tolerances that a good workshop leaves; phases are arbitrary. ISO 1328-1 allows, for 50 to 125 mm and this
     /// module, a total cumulative pitch deviation of 18 µm in grade 5; it is largest once or twice around, where work
-    /// and cutter stand beside their axes or the ring is clamped, and falls with the order.
+    /// and cutter are offset from their axes or the ring is clamped, and falls with the order.
     ///
     /// * pitch of the flexspline: 4, 4 and 1.5 µm of orders 1, 2 and 3, 14 µm in all; of the circular spline 5, 4.5 and
     ///   1.5 µm, 17 µm in all: grade 5;
-    /// * runout of the flexspline, eccentricity of the circular spline, its bearing beside the axis of the housing, the
-    ///   generator beside its axis: 3 µm each, 6 µm on a dial where grade 5 allows 15 µm. More would be taken up by the
+    /// * runout of the flexspline, eccentricity of the circular spline, its bearing off the axis of the housing, the
+    ///   generator off its axis: 3 µm each, 6 µm on a dial where grade 5 allows 15 µm. More would be taken up by the
     ///   Oldham coupling, in which a real generator floats; here its axis is held;
     /// * ovality of the circular spline 4 µm: what bolts leave of a round ring of 53.5 mm radius and 4 mm wall;
     /// * one lobe of the generator 3 µm higher, form of the cam 1.5 and 1 µm of orders 3 and 4, 5 µm in all: a ground
@@ -400,7 +400,7 @@ impl Drive {
         Drive { name: "HHD-95-hermetic".to_owned(), sleeve, ..Drive::hhd_95() }
     }
 
-    /// The plane drive: no third dimension, nothing beside the rim but that it does not turn.
+    /// The plane drive: no third dimension, nothing holds the rim but that it does not turn.
     pub fn hhd_95_plane() -> Drive {
         let sleeve = Sleeve { kind: SleeveKind::None, ..Sleeve::default() };
         Drive { name: "HHD-95-plane".to_owned(), sleeve, ..Drive::hhd_95() }

@@ -15,8 +15,8 @@ impl Ribs {
     /// The teeth of a drive on its rim.
     ///
     /// Along the axis a tooth is a straight rib of its own cross-section: it carries its area, and its second moment
-    /// about the common centroid, beside the wall's. Around the axis the toothed rim bends like a smooth one that is
-    /// stiffer; by how much is asked of plane FEM of one tooth pitch in pure bending.
+    /// about the common centroid, in addition to the wall's. Around the axis the toothed rim bends like a smooth one
+    /// that is stiffer; by how much is asked of plane FEM of one tooth pitch in pure bending.
     pub fn of_teeth(drive: &Drive) -> Result<Ribs, MeshError> {
         let wheel = &drive.flexspline;
         let wall = wheel.rim_thickness_mm;
@@ -52,8 +52,8 @@ fn tooth_moments(drive: &Drive) -> Result<[f64; 3], DriveError> {
     Ok(moments)
 }
 
-/// Adds the small-strain stiffness of sector 0 of a mesh. The nodes on its far face move as those on the near one, turned
-/// by a pitch, and by the unknowns and weights that `beyond` gives for a node of the far face in each direction.
+/// Adds the small-strain stiffness of sector 0 of a mesh. The nodes on its far face move as those on the near one,
+/// turned by a pitch, and by the unknowns and weights that `beyond` gives for a node of the far face in each direction.
 pub(super) fn add_sector(
     to: &mut Symmetric,
     mesh: &WheelMesh,
@@ -80,7 +80,7 @@ pub(super) fn add_sector(
 
 /// Bending stiffness of the toothed rim around the axis, relative to that of the smooth one.
 ///
-/// One sector of the mesh; its far face moves as the near one, turned by a pitch, and beside that as a rigid body: by a
+/// One sector of the mesh; its far face moves as the near one, turned by a pitch, and in addition as a rigid body: by a
 /// translation that is free and a rotation, whose stiffness is asked for.
 fn bending_around(drive: &Drive) -> Result<f64, MeshError> {
     let plain = Drive { as_built: Default::default(), ..drive.clone() };

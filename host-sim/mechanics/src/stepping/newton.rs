@@ -631,7 +631,7 @@ impl<'p> Solver<'p> {
     ///
     /// With `chord` the last tangent serves again.
     fn solve(&mut self, residual: &Unbalance, chord: bool) -> Option<NewtonStep> {
-        // What the forces do without the border, where it was solved with a new factor's own.
+        // Displacements by the forces without the border, solved together with the border of a new factor.
         let mut begun = None;
         if !chord || self.eliminated.is_none() {
             self.eliminated = None;

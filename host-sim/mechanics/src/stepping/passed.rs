@@ -76,7 +76,7 @@ impl Passed {
             (pitches - pitches.round()).abs()
         };
         if steady {
-            // What was passed in the first pitch may not have settled yet.
+            // States of the first pitch may not have settled yet.
             let settled = |state: &State| (state.generator_rad - self.since).abs() > pitch;
             let passed: Vec<&State> = self.states.iter().filter(|state| settled(state)).collect();
             let pitches = |state: &&State| (generator_rad - state.generator_rad) / pitch;

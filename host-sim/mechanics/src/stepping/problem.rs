@@ -303,7 +303,7 @@ impl Problem {
         state.leans = leans;
     }
 
-    /// The waves of the rim that shells beside it hold, in a state: harmonic, and amplitude a (mm) of `cos n theta` and
+    /// The waves of the rim that adjoining shells hold, in a state: harmonic, and amplitude a (mm) of `cos n theta` and
     /// of `sin n theta`.
     pub fn rim_waves(&self, state: &State) -> Vec<(u32, [f64; 2])> {
         let pairs = self.third.additions.iter().zip(self.waves.chunks_exact(2));
@@ -355,7 +355,7 @@ impl Problem {
     /// space.
     pub(super) fn check_range(&self, state: &State) -> Result<(), SolveError> {
         let (mesh, _) = self.wheels();
-        // As built, some root of a space may stand further in, and the tooth and the axis beside their places.
+        // As built, some root of a space may stand further in, and tooth and axis off their places.
         let further_in = self.deviations.spaces.iter().map(|space| -space.translation[0]).fold(0.0, f64::max);
         let root = self.drive.circular_spline.root_radius_mm - further_in;
         let axis = self.deviations.axis;
@@ -364,8 +364,8 @@ impl Problem {
                 let Some(&tip) = flank.nodes.last() else { continue };
                 let n = mesh.node(tooth as isize, tip);
                 let x = mesh.nodes[n];
-                let beside = rotate(self.deviations.teeth[tooth].translation, mesh.sector_angle(tooth).sin_cos());
-                let [dx, dy] = [beside[0] - axis[0], beside[1] - axis[1]];
+                let offset = rotate(self.deviations.teeth[tooth].translation, mesh.sector_angle(tooth).sin_cos());
+                let [dx, dy] = [offset[0] - axis[0], offset[1] - axis[1]];
                 let radius = (x[0] + state.u[2 * n] + dx).hypot(x[1] + state.u[2 * n + 1] + dy);
                 if radius > root {
                     return Err(SolveError::OutOfRange {
