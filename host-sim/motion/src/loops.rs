@@ -183,7 +183,7 @@ impl TwoMasses {
 
     /// Margin of the mesh torque's loop: its distance from +1, around a servo that is stable itself.
     pub fn torque_loop(&self, servo: &ServoSettings, path: &LoopTorquePath) -> Margin {
-        margin(servo, |w| ONE + self.returned(servo, path, w) * -1.0)
+        margin(servo, |w| ONE - self.returned(servo, path, w))
     }
 
     /// The widest low-pass (Hz) with which the mesh torque's loop is stable at this distance from +1, up to the most
