@@ -24,7 +24,8 @@ const INCREMENTS: usize = 5;
 fn repeats(kind: GeneratorKind, mesh: MeshLevel, torque_n_m: f64) {
     let problem = hhd_95(kind, mesh);
     let mut run = loaded(&problem, torque_n_m);
-    let first = run.settled_pitch(1.0, INCREMENTS).unwrap();
+    run.settle(run.pitch() / INCREMENTS as f64).unwrap();
+    let first = run.turn_in(run.pitch(), INCREMENTS).unwrap();
     run.forget();
     let second = run.turn_in(run.pitch(), INCREMENTS).unwrap();
     let errors = || first.iter().map(|sample| sample.error_arcsec);

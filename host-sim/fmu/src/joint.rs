@@ -145,8 +145,6 @@ const OF_SCENARIO: [(usize, Number); 24] = [
     (CURRENT_NOISE, |scenario| &mut scenario.servo.current_noise_n_m),
     (DRIVE_TEMPERATURE, |scenario| &mut scenario.temperature_c),
 ];
-/// In the order of [`TORQUES`].
-const TORQUE_OF: [TorqueKnown; 4] = [TorqueKnown::OnLoad, TorqueKnown::InMesh, TorqueKnown::Current, TorqueKnown::Not];
 
 /// Start values of a scenario, by the name of their variable.
 pub fn starts_of(scenario: &Scenario) -> Vec<(&'static str, f64)> {
@@ -168,7 +166,7 @@ fn scenario_of(values: &[f64]) -> Scenario {
     for (place, number) in OF_SCENARIO {
         *number(&mut scenario) = values[place];
     }
-    scenario.torque = TORQUE_OF[(values[TORQUE_KNOWN] as usize).min(3)];
+    (_, scenario.torque) = TorqueKnown::NAMES[(values[TORQUE_KNOWN] as usize).min(3)];
     scenario.servo.steps = values[STEPS] as usize;
     scenario.servo.late_steps = values[LATE_STEPS] as usize;
     scenario.servo.encoder_bits = values[ENCODER_BITS] as u32;

@@ -11,7 +11,7 @@ use crate::measurement::{
 };
 use crate::nominal::Nominal;
 
-/// Fewest rows that a table is played over.
+/// Fewest rows that a table is played over. *Source*: one has no mean to be about.
 pub(crate) const FEW: usize = 2;
 
 /// Reads a file of rows of a drive with this model, and the table that takes its place where there is one.

@@ -1,4 +1,4 @@
-//! Which part of a drive gives how much of its torsion, hysteresis and loss, beside a catalogue:
+//! Which part of a drive gives how much of its torsion and hysteresis, next to a catalogue:
 //! `catalogue_budget [cone | map] [SIZE …]`
 //!
 //! Sizes 17, 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim,
@@ -20,50 +20,30 @@ use std::f64::consts::PI;
 use std::process::ExitCode;
 
 use flexspline_base::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
-use flexspline_mechanics::bearing::{Balls, Lubricant, load_torque_n_mm, lubricant_torque_n_mm};
+use flexspline_mechanics::bearing::Balls;
 use flexspline_mechanics::contact::{Configuration, FlankLaw};
 use flexspline_mechanics::drive::{Drive, FewNumbers, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::sleeve::Flexspline3d;
 use flexspline_mechanics::stepping::{Face, Method, Problem, SolveError, SolverSettings};
 
-/// What the catalogue has (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting, no-load torque at 2000
-/// rpm and efficiency of Schaeffler's RT1, same sizes).
+/// Values of the catalogue (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting torque of Schaeffler's
+/// RT1, same sizes).
 struct Catalogue {
     size: u32,
     /// T1, T2 and the rated torque, N·m.
     loads_n_m: [f64; 3],
     k_n_m_per_rad: [f64; 3],
     start_n_m: Option<f64>,
-    no_load_n_m: Option<f64>,
 }
 
 const CATALOGUE: [Catalogue; 3] = [
-    Catalogue {
-        size: 17,
-        loads_n_m: [3.9, 12.0, 24.0],
-        k_n_m_per_rad: [1.0e4, 1.4e4, 1.6e4],
-        start_n_m: Some(0.029),
-        no_load_n_m: Some(0.051),
-    },
-    Catalogue {
-        size: 25,
-        loads_n_m: [14.0, 48.0, 67.0],
-        k_n_m_per_rad: [3.1e4, 5.0e4, 5.7e4],
-        start_n_m: Some(0.069),
-        no_load_n_m: Some(0.195),
-    },
-    Catalogue {
-        size: 40,
-        loads_n_m: [54.0, 196.0, 265.0],
-        k_n_m_per_rad: [1.3e5, 2.0e5, 2.3e5],
-        start_n_m: None,
-        no_load_n_m: None,
-    },
+    Catalogue { size: 17, loads_n_m: [3.9, 12.0, 24.0], k_n_m_per_rad: [1.0e4, 1.4e4, 1.6e4], start_n_m: Some(0.029) },
+    Catalogue { size: 25, loads_n_m: [14.0, 48.0, 67.0], k_n_m_per_rad: [3.1e4, 5.0e4, 5.7e4], start_n_m: Some(0.069) },
+    Catalogue { size: 40, loads_n_m: [54.0, 196.0, 265.0], k_n_m_per_rad: [1.3e5, 2.0e5, 2.3e5], start_n_m: None },
 ];
 
-/// What no maker publishes.
+/// Numbers that no maker publishes.
 #[derive(Clone, Copy)]
 struct Guess {
     /// Length and wall of the cup over its pitch diameter: about half as long as wide, the wall about a hundredth.
@@ -84,22 +64,15 @@ const GUESS: Guess =
     Guess { length: 0.5, wall: 0.011, balls: 23, ball: 1.0, width: 1.0, crowning: 0.1, deeper_um: 0.0 };
 /// Thickness of the cup's bottom over its wall, hub over the pitch radius. Guesses.
 const BOTTOM: [f64; 2] = [2.0, 0.5];
-/// Teeth carry about so far to either side of the major axis, rad: for the share of two lobes in the cup's torsion. A
-/// tenth of all teeth.
-const LOBE_RAD: f64 = 0.16;
 /// Flank friction: greased steel.
 const FRICTION: f64 = 0.08;
-/// Load at which the width of the loop is told, over the rated one: above the drag, below T1.
+/// Load at which the width of the loop is reported, over the rated one: above the drag, below T1.
 const LOOP_SHARE: f64 = 0.04;
 /// Pairs of flanks nearer than this are looked at, mm.
 const NEAR_MM: f64 = 0.02;
 /// Preloads between which flanks come free of play, µm: what a drive may have; and how closely that place is found.
 const PRELOAD_RANGE_UM: [f64; 2] = [-50.0, 50.0];
 const PLAY_UM: f64 = 0.25;
-/// Friction of the bearing: f0 for grease, f1 for balls (Harris), both from the middle of their ranges.
-const F0: f64 = 1.5;
-const F1: f64 = 5e-4;
-
 /// Preloads of S-shaped teeth, µm: drives of the catalogue have no play, and how much deeper their teeth mesh is not
 /// published.
 const PRELOADS_UM: [f64; 2] = [1.0, 3.0];
@@ -137,8 +110,8 @@ struct Loaded {
     /// Load along the face of the flank that bears most, there: peak over mean, and the share that bears.
     peak_over_mean: [f64; 3],
     share_of_face: [f64; 3],
-    /// Sum of all ball loads without load and under the rated one, N.
-    sum_n: [f64; 2],
+    /// Sum of all ball loads without load, N.
+    sum_n: f64,
     /// Tilt under the last load of the teeth that bear, mean by their load, mrad.
     bearing_tilt_mrad: f64,
 }
@@ -182,8 +155,7 @@ fn loaded(drive: &Drive, loads_n_m: &[f64]) -> Result<Loaded, SolveError> {
         let sum_n = 2.0 * last.lobe_force_n / mean_cosine;
         (sum_n / (share * f64::from(balls.count)).max(2.0), sum_n)
     };
-    let mut found = Loaded::default();
-    found.sum_n[0] = carried(&motion).1;
+    let mut found = Loaded { sum_n: carried(&motion).1, ..Loaded::default() };
     let touch = 2.0 * drive.output.drag_torque_n_m;
     motion.load(touch)?;
     let mut from = (touch, motion.error_rad(), carried(&motion).0);
@@ -197,7 +169,6 @@ fn loaded(drive: &Drive, loads_n_m: &[f64]) -> Result<Loaded, SolveError> {
         (found.peak_over_mean[range], found.share_of_face[range]) = (peak_over_mean, share);
         from = to;
     }
-    found.sum_n[1] = carried(&motion).1;
     found.bearing_tilt_mrad = bearing_tilt_mrad(&motion);
     Ok(found)
 }
@@ -208,13 +179,13 @@ fn loop_arcsec(drive: &Drive, rated_n_m: f64, share: f64) -> Result<f64, SolveEr
     let problem = problem(&rough(drive))?;
     let mut motion = Motion::deformed(&problem, 0.0)?;
     let light = share * rated_n_m;
-    let mut told = [0.0; 2];
-    for (told, before) in told.iter_mut().zip([rated_n_m, -rated_n_m]) {
+    let mut errors_rad = [0.0; 2];
+    for (error_rad, before) in errors_rad.iter_mut().zip([rated_n_m, -rated_n_m]) {
         motion.load(before)?;
         motion.load(light)?;
-        *told = motion.error_rad();
+        *error_rad = motion.error_rad();
     }
-    Ok((told[0] - told[1]) * ARCSEC_PER_RAD)
+    Ok((errors_rad[0] - errors_rad[1]) * ARCSEC_PER_RAD)
 }
 
 fn rough(drive: &Drive) -> Drive {
@@ -228,7 +199,9 @@ fn turning_n_m(drive: &Drive) -> Result<f64, SolveError> {
     const INCREMENTS: usize = 8;
     let problem = problem(&rough(drive))?;
     let mut motion = Motion::deformed(&problem, 0.0)?;
-    let places = motion.settled_pitch(1.0, INCREMENTS)?;
+    let pitch = motion.pitch();
+    motion.settle(pitch / INCREMENTS as f64)?;
+    let places = motion.turn_in(pitch, INCREMENTS)?;
     Ok(places.iter().map(|place| place.increment.generator_torque_n_m).sum::<f64>() / INCREMENTS as f64)
 }
 
@@ -328,7 +301,7 @@ fn line(what: &str, entry: &Catalogue, found: &Loaded) {
         three(found.share_in_contact.map(|share| 100.0 * share), 0),
         three(found.peak_over_mean, 1),
         three(found.share_of_face, 2),
-        0.5 * found.sum_n[0],
+        0.5 * found.sum_n,
         found.bearing_tilt_mrad,
     );
 }
@@ -410,7 +383,6 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     let [plane, cup] = plane_and_cup(entry, &GUESS)?;
     let pitch_mm = 2.54 * f64::from(entry.size);
     let bore_mm = 2.0 * plane.flexspline.bore_radius_mm();
-    let balls = Balls::in_proportion(bore_mm);
     let alone = loaded(&plane, &entry.loads_n_m)?;
     let in_cup = loaded(&cup, &entry.loads_n_m)?;
     let with_balls = loaded_on_balls(&cup, &GUESS, in_cup.ball_n, entry.loads_n_m)?.k;
@@ -418,8 +390,6 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     let s_shaped = |preload_um: f64, load_n: f64| on_balls(&cup.clone().with_s_teeth(preload_um), &GUESS, load_n);
     let preloaded = loaded_on_balls(&cup.clone().with_s_teeth(PRELOADS_UM[0]), &GUESS, in_cup.ball_n, entry.loads_n_m)?;
     let (with_s, contacts) = (preloaded.k, preloaded.share_in_contact);
-    let shells = Flexspline3d::of(&cup, true)?;
-    let [around, lobes] = [shells.torsion_n_m_per_rad(), shells.torsion_at_lobes_n_m_per_rad(LOBE_RAD)];
 
     println!(
         "size {}, i = 100: 200 teeth, module {:.4} mm, cup {:.1} x {:.2} mm (guess)",
@@ -451,12 +421,6 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     row("", with_s.map(|k| 1e-4 * k), "1e4 N·m/rad");
     row("missing", part(entry.k_n_m_per_rad, Some(with_s)), "%");
     row("flanks in contact, end of range", contacts.map(|share| 100.0 * share), "% of the teeth");
-    println!(
-        "  shells alone: torsion {:.3e} N·m/rad all around, {:.3e} at two lobes ({:+.0} % compliance)",
-        around,
-        lobes,
-        100.0 * (around / lobes - 1.0)
-    );
 
     let rated = entry.loads_n_m[2];
     let flanks = [loop_arcsec(&plane, rated, LOOP_SHARE)?, loop_arcsec(&cup, rated, LOOP_SHARE)?];
@@ -476,36 +440,14 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     }
     println!(
         "  at most by the race in the bore, {:.0} N on it: {:.1}″; by an output seal: {:.1}″",
-        in_cup.sum_n[0],
-        race_on_bore(in_cup.sum_n[0], bore_mm, in_cup.k[0]),
+        in_cup.sum_n,
+        race_on_bore(in_cup.sum_n, bore_mm, in_cup.k[0]),
         seal(pitch_mm, in_cup.k[0])
     );
     if let Some(start) = entry.start_n_m {
         let reflected = 2.0 * 100.0 * start / entry.k_n_m_per_rad[2] * ARCMIN_PER_RAD;
         println!("  loop by the catalogue's starting torque through the ratio, 2 i T_start/K3: {reflected:.2}′");
     }
-    // Balls run between the bore and the plug of the cam: their circle is one ball and the outer race inside the bore.
-    let mean_mm = bore_mm - 2.0 * balls.diameter_mm;
-    for (name, lubricant) in [("mineral VG 32", Lubricant::MINERAL_VG_32), ("PFPE Z25", Lubricant::PFPE_Z25)] {
-        let drag = |temperature_c: f64, speed_rpm: f64| {
-            1e-3 * (lubricant_torque_n_mm(F0, lubricant.viscosity_cst(temperature_c), speed_rpm, mean_mm)
-                + load_torque_n_mm(F1, in_cup.sum_n[0], mean_mm))
-        };
-        println!(
-            "  bearing drag, {name}: at 1 rpm {:.3} N·m, 2000 rpm {:.3} N·m, 2000 rpm at −20 °C {:.3} N·m; catalogue \
-             start {}, 2000 rpm {}",
-            drag(20.0, 1.0),
-            drag(20.0, 2000.0),
-            drag(-20.0, 2000.0),
-            entry.start_n_m.map_or("—".into(), |t| format!("{t:.3}")),
-            entry.no_load_n_m.map_or("—".into(), |t| format!("{t:.3}")),
-        );
-    }
-    let by_load = 1e-3 * load_torque_n_mm(F1, in_cup.sum_n[1], mean_mm);
-    println!(
-        "  under {rated} N·m the ball loads take {by_load:.3} N·m, {:.1} % of T/i",
-        100.0 * by_load / (rated / 100.0)
-    );
     Ok(())
 }
 

@@ -1,14 +1,7 @@
-//! The rolling bearing of a wave generator by closed forms: how balls give way, and what they cost.
+//! The rolling bearing of a wave generator by a closed form: how far its balls give way under load.
 //!
-//! * **Approach** of a ball between two races of usual osculation, both contacts together: `4.37e-4 (Q²/d)^(1/3)` mm
-//!   (Palmgren, *Ball and Roller Bearing Engineering*, 1959).
-//! * **Friction** of a bearing, the sum of what lubricant and load take: `M0 = 1e-7 f0 (nu n)^(2/3) d_m³` N·mm from nu
-//!   n = 2000 cSt/min on, `160e-7 f0 d_m³` below; `M1 = f1 P d_m` (Palmgren; Harris, *Rolling Bearing Analysis*,
-//!   "friction in rolling bearings"). A generator is loaded at two lobes, so P is the sum of all ball loads and no
-//!   resultant.
-//! * **Viscosity** over temperature: `lg lg (nu + 0.7) = A - B lg T` (Walther; ASTM D341), T in kelvin.
-//!
-//! f0 depends on how much grease there is and is the least known number here.
+//! The approach of a ball between two races of usual osculation, both contacts together, is `4.37e-4 (Q²/d)^(1/3)` mm
+//! (Palmgren, *Ball and Roller Bearing Engineering*, 1959).
 
 /// Balls of one size around a generator.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,42 +37,6 @@ impl Balls {
     }
 }
 
-/// A lubricant by the two numbers of its line in Walther's chart.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lubricant {
-    /// A.
-    pub a: f64,
-    /// B.
-    pub b: f64,
-}
-
-impl Lubricant {
-    /// Mineral oil of ISO VG 32 (86 cSt at 20 °C).
-    pub const MINERAL_VG_32: Lubricant = Lubricant { a: 9.5308, b: 3.7466 };
-    /// Perfluoropolyether Z25, of greases for space (270 cSt at 20 °C).
-    pub const PFPE_Z25: Lubricant = Lubricant { a: 4.0658, b: 1.4916 };
-
-    /// Kinematic viscosity, cSt.
-    pub fn viscosity_cst(&self, temperature_c: f64) -> f64 {
-        let lines = self.a - self.b * (temperature_c + 273.15).log10();
-        10_f64.powf(10_f64.powf(lines)) - 0.7
-    }
-}
-
-/// nu n below which the lubricant's part no longer falls, cSt/min.
-const SLOW: f64 = 2000.0;
-
-/// Torque of the lubricant, N·mm; mean diameter of the bearing in mm, speed in turns a minute.
-pub fn lubricant_torque_n_mm(f0: f64, viscosity_cst: f64, speed_rpm: f64, mean_diameter_mm: f64) -> f64 {
-    // 2000^(2/3) is 159: the two branches meet to 1 %.
-    1e-7 * f0 * (viscosity_cst * speed_rpm).max(SLOW).powf(2.0 / 3.0) * mean_diameter_mm.powi(3)
-}
-
-/// Torque of the load, N·mm; `load_n` is the sum of the loads of all balls.
-pub fn load_torque_n_mm(f1: f64, load_n: f64, mean_diameter_mm: f64) -> f64 {
-    f1 * load_n * mean_diameter_mm
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,32 +57,5 @@ mod tests {
         let (q, step) = (200.0, 1e-3);
         let secant = 2.0 * step / (balls.approach_mm(q + step) - balls.approach_mm(q - step));
         assert!((secant / balls.stiffness_n_per_mm(q) - 1.0).abs() < 1e-6);
-    }
-
-    /// Kinematic viscosities of the two lubricants, cSt, at 20, -20 and -40 °C; mineral oil at -20 °C.
-    #[test]
-    fn lubricants_thicken_in_the_cold_as_their_sheets_say() {
-        for (temperature_c, expected) in [(20.0, 270.0), (-20.0, 1060.0), (-40.0, 2640.0)] {
-            let found = Lubricant::PFPE_Z25.viscosity_cst(temperature_c);
-            assert!((found / expected - 1.0).abs() < 0.05, "{temperature_c}: {found}");
-        }
-        // What VG 32 means (ISO 3448): 32 cSt at 40 °C.
-        let named = Lubricant::MINERAL_VG_32.viscosity_cst(40.0);
-        assert!((named / 32.0 - 1.0).abs() < 0.01, "{named}");
-        for (temperature_c, expected) in [(20.0, 86.0), (-20.0, 2300.0)] {
-            let found = Lubricant::MINERAL_VG_32.viscosity_cst(temperature_c);
-            assert!((found / expected - 1.0).abs() < 0.05, "{temperature_c}: {found}");
-        }
-    }
-
-    /// Slow bearings: `160e-7 f0 d_m³`. Eight times the speed of a fast one: four times the torque.
-    #[test]
-    fn lubricant_takes_more_with_speed_and_no_less_at_rest() {
-        let slow = lubricant_torque_n_mm(1.0, 100.0, 1.0, 50.0);
-        assert!((slow / (160e-7 * 50_f64.powi(3)) - 1.0).abs() < 0.01, "{slow}");
-        let [once, eightfold] = [500.0, 4000.0].map(|speed| lubricant_torque_n_mm(1.0, 100.0, speed, 50.0));
-        assert!((eightfold / once - 4.0).abs() < 1e-9);
-        assert!((lubricant_torque_n_mm(2.5, 100.0, 500.0, 50.0) / once - 2.5).abs() < 1e-12);
-        assert!((load_torque_n_mm(5e-4, 2000.0, 50.0) - 50.0).abs() < 1e-12);
     }
 }

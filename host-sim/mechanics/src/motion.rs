@@ -76,11 +76,11 @@ impl<'p> Motion<'p> {
     }
 
     /// The drive deformed at an angle where both flanks may come to bear at once, as they do of an eccentric drive:
-    /// there Newton may go round in a circle, and the drive is deformed beside and turned in. The output then need not
+    /// there Newton may go round in a circle, and the drive is deformed nearby and turned in. The output then need not
     /// be in the middle of its clearance.
     ///
     /// # Errors
-    /// No equilibrium, neither there nor beside.
+    /// No equilibrium, neither there nor nearby.
     pub fn deformed_or_turned_in(problem: &'p Problem, generator_rad: f64) -> Result<Motion<'p>, SolveError> {
         let first = match Motion::deformed(problem, generator_rad) {
             Err(error) => error,
@@ -263,21 +263,10 @@ impl<'p> Motion<'p> {
         while self.settle_on(step_rad)? {}
         Ok(())
     }
-
-    /// Settles in the sense of `sense` (+1 or −1), then turns by one flexspline pitch; the place at the end of each of
-    /// its increments.
-    ///
-    /// # Errors
-    /// No equilibrium; or the drive does not settle.
-    pub fn settled_pitch(&mut self, sense: f64, increments: usize) -> Result<Vec<SettledPlace>, SolveError> {
-        let turn = sense * self.pitch();
-        self.settle(turn / increments as f64)?;
-        self.turn_in(turn, increments)
-    }
 }
 
 impl Travel {
-    /// The motion after an increment that turned generator and output by so much.
+    /// The motion after an increment that turned generator and output by these angles.
     pub fn on(self, [turn_rad, output_turn_rad]: [f64; 2], same_load: bool, ratio: f64) -> Travel {
         if turn_rad == 0.0 {
             return Travel::default();
@@ -293,7 +282,7 @@ impl Travel {
         }
     }
 
-    /// Whether the drive has settled, which must at least have moved on by so much.
+    /// Whether the drive has settled, which must at least have moved on by this angle.
     pub fn settled(&self, least_rad: f64) -> bool {
         self.followed && self.travelled_rad >= least_rad * (1.0 - 1e-9)
     }

@@ -27,12 +27,11 @@ pub fn scenario() -> Scenario {
             .map(|(seconds, rate_rad_s)| Leg { seconds, rate_rad_s })
             .to_vec(),
         acceleration_rad_s2: 0.05,
-        load: Load { bias_n_m: 8.0, swing: [6.0, 0.05], gust: [1.5, 0.3], step: [0.0; 2], gravity: [0.0; 2] },
+        load: Load { bias_n_m: 8.0, swing: [6.0, 0.05], gust: [1.5, 0.3], ..Load::default() },
         load_kg_m2: 3.0,
         drag_n_m: 0.5,
         damping: 0.02,
         temperature_c: 20.0,
-        warming_k_s: 0.0,
         servo: ServoSettings {
             tick_s: 1e-3,
             steps: 5,
@@ -53,5 +52,6 @@ pub fn scenario() -> Scenario {
         torque_noise_n_m: 0.05,
         table: TableKnown::Calibrated,
         seed: 3,
+        ..Scenario::default()
     }
 }

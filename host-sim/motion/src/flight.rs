@@ -197,9 +197,7 @@ pub struct Flight {
     pub servo_distance: f64,
     /// Motor, load and what is between, as the servo's loop is judged by.
     pub joint: TwoMasses,
-    /// Stiffness under the mean load, N·m/rad, and resonances with the motor held and free, Hz.
-    pub stiffness: f64,
-    /// See there.
+    /// Resonances with the motor held and free, Hz.
     pub resonances_hz: [f64; 2],
 }
 
@@ -321,7 +319,6 @@ pub fn fly_watched(
         phase_margin_deg: made.masses.phase_margin_deg(&scenario.servo),
         servo_distance: if margin.stable { margin.distance } else { 0.0 },
         joint: made.masses,
-        stiffness: made.masses.stiffness,
         resonances_hz: [made.masses.locked_hz(), made.masses.free_hz()],
     })
 }

@@ -15,46 +15,25 @@
 
 use core::f64::consts::{PI, TAU};
 
+use num_complex::Complex64;
+
 use super::servo::ServoSettings;
 
-/// A complex number.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Complex(f64, f64);
+const ONE: Complex64 = Complex64::new(1.0, 0.0);
 
-impl Complex {
-    const ONE: Complex = Complex(1.0, 0.0);
+// By libm, which gives the same bits on every machine.
+fn size(z: Complex64) -> f64 {
+    libm::hypot(z.re, z.im)
+}
 
-    fn plus(self, other: Complex) -> Complex {
-        Complex(self.0 + other.0, self.1 + other.1)
-    }
+fn angle(z: Complex64) -> f64 {
+    libm::atan2(z.im, z.re)
+}
 
-    fn times(self, other: Complex) -> Complex {
-        Complex(self.0 * other.0 - self.1 * other.1, self.0 * other.1 + self.1 * other.0)
-    }
-
-    fn over(self, other: Complex) -> Complex {
-        let square = other.0 * other.0 + other.1 * other.1;
-        let Complex(a, b) = self.times(Complex(other.0, -other.1));
-        Complex(a / square, b / square)
-    }
-
-    fn scaled(self, by: f64) -> Complex {
-        Complex(self.0 * by, self.1 * by)
-    }
-
-    fn size(self) -> f64 {
-        libm::hypot(self.0, self.1)
-    }
-
-    fn angle(self) -> f64 {
-        libm::atan2(self.1, self.0)
-    }
-
-    /// `exp(−j·x)`.
-    fn late(x: f64) -> Complex {
-        let (s, c) = libm::sincos(x);
-        Complex(c, -s)
-    }
+/// `exp(−j·x)`.
+fn late(x: f64) -> Complex64 {
+    let (s, c) = libm::sincos(x);
+    Complex64::new(c, -s)
 }
 
 /// Motor, load and what is between, at the output.
@@ -136,27 +115,27 @@ impl TwoMasses {
     }
 
     /// Motor torque to motor angle.
-    fn plant(&self, w: f64) -> Complex {
+    fn plant(&self, w: f64) -> Complex64 {
         let TwoMasses { motor_kg_m2: motor, load_kg_m2: load, stiffness, damping_s, .. } = *self;
-        let spring = Complex(stiffness, stiffness * damping_s * w);
-        let above = spring.plus(Complex(-load * w * w, 0.0));
-        let below = spring.scaled(motor + load).plus(Complex(-motor * load * w * w, 0.0)).scaled(-w * w);
-        above.over(below)
+        let spring = Complex64::new(stiffness, stiffness * damping_s * w);
+        let above = spring + Complex64::new(-load * w * w, 0.0);
+        let below = (spring * (motor + load) + Complex64::new(-motor * load * w * w, 0.0)) * (-w * w);
+        above / below
     }
 
     /// Motor angle to the torque that the compensation turns into angle again, over the stiffness.
-    fn carried(&self, w: f64) -> Complex {
+    fn carried(&self, w: f64) -> Complex64 {
         let TwoMasses { load_kg_m2: load, stiffness, damping_s, .. } = *self;
-        let spring = Complex(stiffness, stiffness * damping_s * w);
-        let inertia = Complex(-load * w * w, 0.0);
-        inertia.times(spring).scaled(1.0 / stiffness).over(spring.plus(inertia))
+        let spring = Complex64::new(stiffness, stiffness * damping_s * w);
+        let inertia = Complex64::new(-load * w * w, 0.0);
+        inertia * spring * (1.0 / stiffness) / (spring + inertia)
     }
 
     /// Margin of the servo.
     pub fn servo(&self, servo: &ServoSettings) -> Margin {
-        let l = |w: f64| self.plant(w).times(control(servo, self.ratio, w, true).0);
+        let l = |w: f64| self.plant(w) * control(servo, self.ratio, w, true).0;
         // L is infinite at zero: looked at from where it is large. Two integrals and more bring the phase there.
-        let distance = |w: f64| Complex::ONE.plus(l(w));
+        let distance = |w: f64| ONE + l(w);
         margin(servo, distance)
     }
 
@@ -164,8 +143,8 @@ impl TwoMasses {
     pub fn servo_loop(&self, servo: &ServoSettings) -> impl Iterator<Item = OpenLoop> + use<> {
         let (joint, servo) = (*self, *servo);
         frequencies(&servo).map(move |hz| {
-            let Complex(real, imaginary) = joint.plant(TAU * hz).times(control(&servo, joint.ratio, TAU * hz, true).0);
-            OpenLoop { hz, real, imaginary }
+            let open = joint.plant(TAU * hz) * control(&servo, joint.ratio, TAU * hz, true).0;
+            OpenLoop { hz, real: open.re, imaginary: open.im }
         })
     }
 
@@ -174,37 +153,37 @@ impl TwoMasses {
         let mut least = [f64::INFINITY, 0.0];
         let mut before = f64::INFINITY;
         for f in frequencies(servo) {
-            let l = self.plant(TAU * f).times(control(servo, self.ratio, TAU * f, true).0);
-            if (before - 1.0) * (l.size() - 1.0) <= 0.0 {
-                let angle = (l.angle() - PI).rem_euclid(TAU);
+            let l = self.plant(TAU * f) * control(servo, self.ratio, TAU * f, true).0;
+            if (before - 1.0) * (size(l) - 1.0) <= 0.0 {
+                let angle = (angle(l) - PI).rem_euclid(TAU);
                 let found = angle.min(TAU - angle) * 360.0 / TAU;
                 if found < least[0] {
                     least = [found, f];
                 }
             }
-            before = l.size();
+            before = size(l);
         }
         least
     }
 
     /// Command to motor angle.
-    fn follows(&self, servo: &ServoSettings, rate_fed_forward: bool, w: f64) -> Complex {
+    fn follows(&self, servo: &ServoSettings, rate_fed_forward: bool, w: f64) -> Complex64 {
         let (back, command) = control(servo, self.ratio, w, rate_fed_forward);
         let plant = self.plant(w);
-        plant.times(command).over(Complex::ONE.plus(plant.times(back)))
+        plant * command / (ONE + plant * back)
     }
 
     /// The loop of the mesh torque through the compensation, at an angular frequency.
-    fn returned(&self, servo: &ServoSettings, path: &LoopTorquePath, w: f64) -> Complex {
-        let low_pass = Complex::ONE.over(Complex(1.0, w / (TAU * path.bandwidth_hz)));
+    fn returned(&self, servo: &ServoSettings, path: &LoopTorquePath, w: f64) -> Complex64 {
+        let low_pass = ONE / Complex64::new(1.0, w / (TAU * path.bandwidth_hz));
         let h = self.follows(servo, path.rate_fed_forward, w);
-        let late = Complex::late(w * (path.late_s + servo.tick_s));
-        low_pass.times(h).times(late).times(self.carried(w)).scaled(path.gain)
+        let late = late(w * (path.late_s + servo.tick_s));
+        low_pass * h * late * self.carried(w) * path.gain
     }
 
     /// Margin of the mesh torque's loop: its distance from +1, around a servo that is stable itself.
     pub fn torque_loop(&self, servo: &ServoSettings, path: &LoopTorquePath) -> Margin {
-        margin(servo, |w| Complex::ONE.plus(self.returned(servo, path, w).scaled(-1.0)))
+        margin(servo, |w| ONE - self.returned(servo, path, w))
     }
 
     /// The widest low-pass (Hz) with which the mesh torque's loop is stable at this distance from +1, up to the most
@@ -248,20 +227,20 @@ impl TwoMasses {
 }
 
 /// The controller, motor angle to torque at the output and command to it, with sampling, holding and lateness.
-fn control(servo: &ServoSettings, ratio: f64, w: f64, rate_fed_forward: bool) -> (Complex, Complex) {
+fn control(servo: &ServoSettings, ratio: f64, w: f64, rate_fed_forward: bool) -> (Complex64, Complex64) {
     let ServoSettings { tick_s, steps, late_steps, inertia_kg_m2, position_hz, speed_hz, integral_hz, .. } = *servo;
-    let s = Complex(0.0, w);
+    let s = Complex64::new(0.0, w);
     let gain = TAU * speed_hz * inertia_kg_m2 * ratio * ratio;
     // Held over a tick.
     let half = 0.5 * w * tick_s;
-    let held = Complex::late(half).scaled(if half == 0.0 { 1.0 } else { libm::sin(half) / half });
-    let late = Complex::late(w * tick_s * late_steps as f64 / steps as f64);
-    let differences = held.times(s);
-    let integral = Complex::ONE.plus(Complex(TAU * integral_hz, 0.0).over(s));
-    let drive = held.times(late).times(integral).scaled(gain);
-    let position = Complex(TAU * position_hz, 0.0);
-    let forward = if rate_fed_forward { position.plus(differences) } else { position };
-    (drive.times(position.plus(differences)), drive.times(forward))
+    let held = late(half) * (if half == 0.0 { 1.0 } else { libm::sin(half) / half });
+    let late = late(w * tick_s * late_steps as f64 / steps as f64);
+    let differences = held * s;
+    let integral = ONE + Complex64::new(TAU * integral_hz, 0.0) / s;
+    let drive = held * late * integral * gain;
+    let position = Complex64::new(TAU * position_hz, 0.0);
+    let forward = if rate_fed_forward { position + differences } else { position };
+    (drive * (position + differences), drive * forward)
 }
 
 fn frequencies(servo: &ServoSettings) -> impl Iterator<Item = f64> + use<> {
@@ -272,26 +251,26 @@ fn frequencies(servo: &ServoSettings) -> impl Iterator<Item = f64> + use<> {
 
 /// Least size of a return difference, and whether it turns around zero: by how much its phase has turned from low
 /// frequencies to half of the sampling frequency, where it must be back to what its ends are.
-fn margin(servo: &ServoSettings, difference: impl Fn(f64) -> Complex) -> Margin {
+fn margin(servo: &ServoSettings, difference: impl Fn(f64) -> Complex64) -> Margin {
     let (mut least, mut at_hz) = (f64::INFINITY, 0.0);
     let mut turned = 0.0;
-    let mut before: Option<Complex> = None;
-    let mut first = Complex::ONE;
+    let mut before: Option<Complex64> = None;
+    let mut first = ONE;
     for f in frequencies(servo) {
         let now = difference(TAU * f);
         match before {
-            Some(before) => turned += now.over(before).angle(),
+            Some(before) => turned += angle(now / before),
             None => first = now,
         }
         before = Some(now);
-        if now.size() < least {
-            (least, at_hz) = (now.size(), f);
+        if size(now) < least {
+            (least, at_hz) = (size(now), f);
         }
     }
     // Integrals in the loop begin with their own phase: what it turns by, if it goes round nothing, is from there to
     // the end.
-    let last = before.unwrap_or(Complex::ONE);
-    let begins = if first.size() > 100.0 { -1.5 * PI } else { first.angle() };
-    let stable = (turned - (last.angle() - begins)).abs() < PI;
+    let last = before.unwrap_or(ONE);
+    let begins = if size(first) > 100.0 { -1.5 * PI } else { angle(first) };
+    let stable = (turned - (angle(last) - begins)).abs() < PI;
     Margin { stable, distance: least, at_hz }
 }

@@ -157,49 +157,26 @@ impl OnBoardSettings {
     /// Of a tape.
     #[must_use]
     pub fn of_bytes(bytes: &[u8; SETTINGS_BYTES]) -> Self {
-        let mut numbers = [0.0; SETTINGS_BYTES / 4];
-        for (number, from) in numbers.iter_mut().zip(bytes.as_chunks::<4>().0) {
-            *number = f32::from_le_bytes(*from);
-        }
-        let [
-            tick_s,
-            rate,
-            acceleration,
-            generator_rate,
-            patience,
-            hold_rad,
-            hz,
-            drag,
-            table_drag,
-            hold,
-            settle,
-            largest,
-            expected,
-            ahead_s,
-            warm,
-        ] = numbers;
-        Self {
-            limits: Limits {
-                tick_s,
-                rate_rad_s: rate,
-                acceleration_rad_s2: acceleration,
-                generator_rate_rad_s: generator_rate,
-                patience: patience as u16,
-                hold_rad,
-            },
-            torque: TorqueSettings {
-                tick_s,
-                bandwidth_hz: hz,
-                drag_n_m: drag,
-                table_drag_n_m: table_drag,
-                hold_n_m: hold,
-                settle_s: settle,
-                largest_n_m: largest,
-            },
-            expected_n_m: expected,
-            ahead_s,
-            temperature_c: warm,
-        }
+        let mut numbers = bytes.as_chunks::<4>().0.iter().map(|number| f32::from_le_bytes(*number));
+        let mut next = || numbers.next().unwrap_or_default();
+        let limits = Limits {
+            tick_s: next(),
+            rate_rad_s: next(),
+            acceleration_rad_s2: next(),
+            generator_rate_rad_s: next(),
+            patience: next() as u16,
+            hold_rad: next(),
+        };
+        let torque = TorqueSettings {
+            tick_s: limits.tick_s,
+            bandwidth_hz: next(),
+            drag_n_m: next(),
+            table_drag_n_m: next(),
+            hold_n_m: next(),
+            settle_s: next(),
+            largest_n_m: next(),
+        };
+        Self { limits, torque, expected_n_m: next(), ahead_s: next(), temperature_c: next() }
     }
 }
 

@@ -36,6 +36,16 @@ pub enum TorqueKnown {
     Not,
 }
 
+impl TorqueKnown {
+    /// All of them in order, by their names in files and results.
+    pub const NAMES: [(&'static str, TorqueKnown); 4] = [
+        ("on_load", TorqueKnown::OnLoad),
+        ("in_mesh", TorqueKnown::InMesh),
+        ("current", TorqueKnown::Current),
+        ("none", TorqueKnown::Not),
+    ];
+}
+
 /// Knowledge of the unit in the table of the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TableKnown {
@@ -46,6 +56,12 @@ pub enum TableKnown {
     Extended,
     /// The unit, sampled at rest with noise.
     Calibrated,
+}
+
+impl TableKnown {
+    /// All of them, by their names in files and results.
+    pub const NAMES: [(&'static str, TableKnown); 3] =
+        [("nominal", TableKnown::Nominal), ("extended", TableKnown::Extended), ("calibrated", TableKnown::Calibrated)];
 }
 
 /// Everything.

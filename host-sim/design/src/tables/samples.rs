@@ -41,16 +41,15 @@ pub fn read(path: &Path) -> Result<Vec<Sample>, SampleError> {
 /// Reads samples from the bytes of a file called `file`.
 pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
     let refused = |what: String| SampleError { file: file.to_owned(), what };
-    let at = |line: u64, what: String| refused(format!("line {line}: {what}"));
-    let text = csv_rows::text(text).map_err(|TableProblem { line, what }| at(line, what))?;
+    let at = |TableProblem { line, what }| refused(format!("line {line}: {what}"));
+    let text = csv_rows::text(text).map_err(at)?;
     let mut rows = csv_rows::rows(&text);
     let (line, header) = rows.next().unwrap_or((1, Vec::new()));
     let mut places = [0; 5];
     for (place, name) in places.iter_mut().zip(COLUMNS) {
-        let found = place_of(name, &header);
-        *place = found.map_err(|what| at(line, format!("{what}; needed are {}", COLUMNS.join(", "))))?;
+        *place = place_of(name, line, &header).map_err(at)?;
     }
-    let sample = |(line, row): (u64, Vec<&str>)| sample(&row, places).map_err(|what| at(line, what));
+    let sample = |(line, row): (u64, Vec<&str>)| sample(line, &row, places).map_err(at);
     let samples = rows.map(sample).collect::<Result<Vec<Sample>, SampleError>>()?;
     if samples.is_empty() {
         return Err(refused("no samples after the header".to_owned()));
@@ -59,36 +58,38 @@ pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
 }
 
 /// Where a column stands.
-fn place_of(name: &str, header: &[&str]) -> Result<usize, String> {
+fn place_of(name: &str, line: u64, header: &[&str]) -> Result<usize, TableProblem> {
     let mut places = (0..header.len()).filter(|place| header[*place] == name);
-    match (places.next(), places.next()) {
-        (Some(place), None) => Ok(place),
-        (Some(_), Some(_)) => Err(format!("column {name} is there twice")),
-        (None, _) => Err(format!("column {name} is missing{}", did_you_mean("; ", name, header.iter().copied()))),
-    }
+    let what = match (places.next(), places.next()) {
+        (Some(place), None) => return Ok(place),
+        (Some(_), Some(_)) => format!("column {name} is there twice"),
+        (None, _) => format!("column {name} is missing{}", did_you_mean("; ", name, header.iter().copied())),
+    };
+    Err(TableProblem { line, what: format!("{what}; needed are {}", COLUMNS.join(", ")) })
 }
 
 /// The sample in a row; the error says field, value and what is allowed.
-fn sample(row: &[&str], places: [usize; 5]) -> Result<Sample, String> {
+fn sample(line: u64, row: &[&str], places: [usize; 5]) -> Result<Sample, TableProblem> {
+    let wrong = |what: String| TableProblem { line, what };
     let mut numbers = [0.0_f64; 5];
     for ((number, place), name) in numbers.iter_mut().zip(places).zip(COLUMNS) {
         let Some(text) = row.get(place) else {
-            return Err(format!("{} fields, but {name} is field {}", row.len(), place + 1));
+            return Err(wrong(format!("{} fields, but {name} is field {}", row.len(), place + 1)));
         };
-        *number = text.parse().map_err(|_| format!("{name} is \"{text}\", not a number"))?;
+        *number = text.parse().map_err(|_| wrong(format!("{name} is \"{text}\", not a number")))?;
         if !number.is_finite() {
-            return Err(format!("{name} is {number}; a finite number is needed"));
+            return Err(wrong(format!("{name} is {number}; a finite number is needed")));
         }
     }
     let [generator_rad, torque_n_m, temperature_c, direction, output_rad] = numbers;
     let direction = match direction {
         1.0 => Direction::Forward,
         -1.0 => Direction::Backward,
-        other => return Err(format!("direction is {other}; allowed are 1 and -1")),
+        other => return Err(wrong(format!("direction is {other}; allowed are 1 and -1"))),
     };
     for ((name, limit, unit), value) in LIMITS.iter().zip([generator_rad, torque_n_m, temperature_c, output_rad]) {
         if value.abs() > *limit {
-            return Err(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible"));
+            return Err(wrong(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible")));
         }
     }
     Ok(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad })

@@ -14,14 +14,6 @@ use super::built_in::{SCENARIOS, built_in};
 use super::results::PACES_HZ;
 use super::{Flown, FlyError};
 
-const TORQUES: [(&str, TorqueKnown); 4] = [
-    ("on_load", TorqueKnown::OnLoad),
-    ("in_mesh", TorqueKnown::InMesh),
-    ("current", TorqueKnown::Current),
-    ("none", TorqueKnown::Not),
-];
-const TABLES: [(&str, TableKnown); 3] =
-    [("nominal", TableKnown::Nominal), ("extended", TableKnown::Extended), ("calibrated", TableKnown::Calibrated)];
 /// Temperatures of a flight, °C: what tables of HHD-95 have.
 const COLDEST_C: f64 = -60.0;
 const WARMEST_C: f64 = 80.0;
@@ -110,8 +102,8 @@ impl To<'_> {
             To::Count(to, allowed) => *to = whole(&allowed, value)? as usize,
             To::Legs(to) => *to = each_of(value, "an array of [seconds, rad/s]", leg)?,
             To::Generator(to) => *to = one_of(&generators(), value)?,
-            To::Torque(to) => *to = one_of(&TORQUES, value)?,
-            To::Table(to) => *to = one_of(&TABLES, value)?,
+            To::Torque(to) => *to = one_of(&TorqueKnown::NAMES, value)?,
+            To::Table(to) => *to = one_of(&TableKnown::NAMES, value)?,
         }
         Ok(())
     }
@@ -129,8 +121,8 @@ impl To<'_> {
                 (format!("{legs:?}"), format!("{} to {} s in all, -1 to 1 rad/s", LASTS_S[0], LASTS_S[1]))
             }
             To::Generator(kind) => named(&generators(), **kind),
-            To::Torque(known) => named(&TORQUES, **known),
-            To::Table(known) => named(&TABLES, **known),
+            To::Torque(known) => named(&TorqueKnown::NAMES, **known),
+            To::Table(known) => named(&TableKnown::NAMES, **known),
         }
     }
 }
@@ -139,10 +131,14 @@ fn generators() -> [(&'static str, GeneratorKind); 4] {
     GeneratorKind::ALL.map(|kind| (kind.name(), kind))
 }
 
-fn named<T: PartialEq>(names: &[(&str, T)], found: T) -> (String, String) {
+fn named<T: PartialEq>(names: &[(&'static str, T)], found: T) -> (String, String) {
     let all: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
-    let name = names.iter().find(|(_, meant)| *meant == found).map_or("", |(name, _)| name);
-    (format!("{name:?}"), all.join(", "))
+    (format!("{:?}", name_of(names, found)), all.join(", "))
+}
+
+/// The name of a value among names.
+pub(super) fn name_of<T: PartialEq>(names: &[(&'static str, T)], found: T) -> &'static str {
+    names.iter().find(|(_, meant)| *meant == found).map_or("", |(name, _)| name)
 }
 
 fn pair(allowed: &[Allowed; 2], value: &Spanned<DeValue<'_>>) -> Result<[f64; 2], Refused> {
@@ -206,7 +202,7 @@ fn read_table(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Flown> {
             file.take(path, to.take(value));
         }
     }
-    // What several fields decide together.
+    // Limits on several fields together.
     let scenario = &flown.scenario;
     let mut refuse = |path: &str, what: String| match at(table, path) {
         Some(value) => file.refuse(value.span(), path, what),

@@ -2,13 +2,15 @@
 
 use flexspline_motion::flight::{COMPENSATED, Flight, Flown, START_UP_S};
 use flexspline_motion::loops::TwoMasses;
-use flexspline_motion::scenario::Scenario;
+use flexspline_motion::scenario::{Scenario, TableKnown, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use flexspline_algebra::spectrum as sums_of;
 use flexspline_base::figures::NamedFigure;
+
+use super::file::name_of;
 
 /// Output less target within this of where it ends counts as settled, arcsec.
 const SETTLED_ARCSEC: f64 = 2.0;
@@ -191,12 +193,12 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
     let rms = by_controller(flight, |flown| flown.error.rms())?;
     let digest = flight.flown.iter().fold(0_u64, |sum, flown| sum.rotate_left(9) ^ flown.digest);
     let core = flight.flown.get(COMPENSATED)?;
-    let current = flight.torque == flexspline_motion::scenario::TorqueKnown::Current;
+    let current = flight.torque == TorqueKnown::Current;
     let mut results = Results {
         scenario: scenario.name.clone(),
         generator: flown.kind.to_string(),
-        torque: snake(&format!("{:?}", flight.torque)),
-        table: snake(&format!("{:?}", scenario.table)),
+        torque: name_of(&TorqueKnown::NAMES, flight.torque).to_owned(),
+        table: name_of(&TableKnown::NAMES, scenario.table).to_owned(),
         seconds: scenario.seconds(),
         rms_arcsec: rms,
         max_arcsec: by_controller(flight, |flown| flown.error.largest())?,
@@ -256,7 +258,7 @@ fn way_out(flight: &Flight, scenario: &Scenario) -> String {
 /// Paces of speed, position and integral with which the servo's loop is sound: the fewest changed, and those least.
 fn sound_paces(joint: &TwoMasses, servo: &ServoSettings) -> Option<[f64; 3]> {
     let paces = [servo.speed_hz, servo.position_hz, servo.integral_hz];
-    // What is printed is what is judged.
+    // The printed value is the judged one.
     let changed = |hz: f64, steps: i32| match steps {
         0 => hz,
         _ => format!("{:.1e}", hz * STEP.powi(steps)).parse().unwrap_or(hz),
@@ -278,16 +280,6 @@ fn sound_paces(joint: &TwoMasses, servo: &ServoSettings) -> Option<[f64; 3]> {
     };
     let tried = all.into_par_iter().map(|steps| [0, 1, 2].map(|pace| changed(paces[pace], steps[pace])));
     tried.find_first(found)
-}
-
-/// `OnLoad` as `on_load`; what is not known is `none`.
-fn snake(name: &str) -> String {
-    match name {
-        "OnLoad" => "on_load".to_owned(),
-        "InMesh" => "in_mesh".to_owned(),
-        "Not" => "none".to_owned(),
-        other => other.to_lowercase(),
-    }
 }
 
 /// From when until when the target stands after it moved, s.

@@ -31,7 +31,7 @@ const FEWEST_STRETCHES: usize = 20;
 /// A stretch over this many steps of a resolution averages them out. A guess.
 const STEPS_OF_A_STRETCH: f64 = 4.0;
 
-/// Standard deviation of a coefficient that nothing is known of, arcsec.
+/// Standard deviation of a coefficient that nothing is known of, arcsec. *Guess*: a thousand turns.
 const UNKNOWN_ARCSEC: f64 = 1e9;
 
 /// Knowledge of a coefficient before the rows, for the variance of a row.

@@ -64,7 +64,7 @@ const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
 const BOTH_WAYS: f64 = 0.1;
 /// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output, whose curve
-/// is smooth over a period of its highest wave…
+/// is smooth over a period of its highest wave… *Guess*.
 const MOST_OF_A_TURN: f64 = 0.75;
 const PERIOD_OF_THE_OUTPUT: f64 = 1.0 / parts::OUTPUT_ORDERS as f64;
 /// …and is held at zero in the rest of the turn where less than this was recorded.

@@ -1,6 +1,6 @@
 //! Wave generator on the bore of the flexspline: unilateral, frictionless (it rolls).
 
-use crate::drive::{GeneratorOutline, OutlineFoot};
+use crate::drive::{GeneratorOutline, OutlineFoot, rotate};
 use crate::fem::element::edge_shape;
 use crate::mesh::WheelMesh;
 
@@ -120,13 +120,10 @@ impl BoreContact {
         open: &mut OpenEdges,
         mut report: impl FnMut(&BorePressure),
     ) {
-        let (sin_g, cos_g) = generator_rad.sin_cos();
+        let turn @ (sin, cos) = generator_rad.sin_cos();
         let foot = |x: [f64; 2]| -> OutlineFoot {
-            let local = [cos_g * x[0] + sin_g * x[1], cos_g * x[1] - sin_g * x[0]];
-            let mut foot = outline.nearest(local);
-            foot.normal =
-                [cos_g * foot.normal[0] - sin_g * foot.normal[1], sin_g * foot.normal[0] + cos_g * foot.normal[1]];
-            foot
+            let foot = outline.nearest(rotate(x, (-sin, cos)));
+            OutlineFoot { normal: rotate(foot.normal, turn), ..foot }
         };
         open.until.resize(self.edges.len(), 0.0);
         // Gap at the end of the edge before, if it was looked at.

@@ -11,7 +11,7 @@
 //! spline, so that action equals reaction and the moment on the output is that of the forces themselves.
 //!
 //! As built ([`FlankDeviations`]) the point becomes that of a tooth displaced as a rigid body, and P(s) the outline of
-//! a space displaced likewise; the axis of the circular spline may stand beside that of the housing, and a worn flank
+//! a space displaced likewise; the axis of the circular spline may be offset from that of the housing, and a worn flank
 //! adds its depth to g. All are constants, so that c and its work stay what they were. The frame that turns with the
 //! circular spline has its origin on the axis of the output bearing: `x` counts from there, and the torque on the
 //! output is the moment about it, wherever toothing and housing have theirs.
@@ -108,7 +108,7 @@ struct CoarsePoint {
 }
 
 /// Contribution of one pair. Local nodes: flexspline flank nodes, then circular-spline flank nodes; two unknowns each.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct PairContribution {
     /// Nodal forces on the wheels, global frame for the flexspline, turning frame for the circular spline (N/mm).
     pub force: Vec<f64>,
@@ -134,12 +134,13 @@ pub struct PairContribution {
     pub along_face: Option<AlongFace>,
 }
 
-/// A point of a pair that bears: its place along the flank, and how far from the axis of the circular spline it and its
-/// foot stand, mm.
+/// A point of a pair that bears: its place along the flank, how far from the axis of the circular spline it and its
+/// foot stand, mm, and the arc length of the foot.
 struct BearingPoint {
     place: FacePoint,
     radius: f64,
     foot_radius: f64,
+    foot_arc: f64,
 }
 
 /// Where a pair bears.
@@ -239,7 +240,7 @@ impl LocalField {
 }
 
 impl<'a> FlankContact<'a> {
-    /// Contact between the flanks of two meshes, the flanks standing beside their nominal places by `deviations`.
+    /// Contact between the flanks of two meshes, the flanks offset from their nominal places by `deviations`.
     pub fn new(
         fs_mesh: &'a WheelMesh,
         cs_mesh: &'a WheelMesh,
@@ -436,8 +437,8 @@ impl<'a> FlankContact<'a> {
             foot = self.space.foot_internal(field.space.recover([x[0] - v[0], x[1] - v[1]]));
         }
         foot.distance += field.depth;
-        foot.normal = field.space.turned(foot.normal);
-        foot.tangent = field.space.turned(foot.tangent);
+        foot.normal = rotate(foot.normal, field.space.turn);
+        foot.tangent = rotate(foot.tangent, field.space.turn);
         foot
     }
 
@@ -484,20 +485,15 @@ impl<'a> FlankContact<'a> {
         }
         let mut points = Vec::with_capacity(4 * (breaks.len() + 3));
         let arc_of = |r: f64| self.tooth.arc_at(r);
+        let point = |position: [f64; 2], radius: f64, weight: f64, arc: f64| {
+            let (edge, xi) = flank.locate(radius);
+            FlankPoint { position, edge, shape: edge_shape(xi), weight, arc, start_traction: 0.0, start_foot: 0.0 }
+        };
         for panel in breaks.windows(2) {
             let (middle, half) = (0.5 * (panel[0] + panel[1]), 0.5 * (panel[1] - panel[0]));
             for (xi, w) in &self.rule {
                 let r = middle + half * xi;
-                let (edge, local) = flank.locate(r);
-                points.push(FlankPoint {
-                    position: self.tooth.point(r),
-                    edge,
-                    shape: edge_shape(local),
-                    weight: w * half * self.tooth.arc_rate(r),
-                    arc: arc_of(r),
-                    start_traction: 0.0,
-                    start_foot: 0.0,
-                });
+                points.push(point(self.tooth.point(r), r, w * half * self.tooth.arc_rate(r), arc_of(r)));
             }
         }
         // Round the tip, carried by the last edge.
@@ -509,17 +505,8 @@ impl<'a> FlankContact<'a> {
             if half > 0.0 {
                 for (xi, w) in &self.rule {
                     let s = middle + half * xi;
-                    let position = self.tooth.rounding_point(s / rho);
-                    let (edge, local) = flank.locate(position[0].hypot(position[1]));
-                    points.push(FlankPoint {
-                        position,
-                        edge,
-                        shape: edge_shape(local),
-                        weight: w * half,
-                        arc: arc_of(end) + s,
-                        start_traction: 0.0,
-                        start_foot: 0.0,
-                    });
+                    let [x, y] = self.tooth.rounding_point(s / rho);
+                    points.push(point([x, y], x.hypot(y), w * half, arc_of(end) + s));
                 }
             }
             from = to;
@@ -582,7 +569,7 @@ impl<'a> FlankContact<'a> {
         }
     }
 
-    /// Tangential tractions at the end of an increment.
+    /// Tangential tractions at the end of an increment; nothing of a pair that is open.
     pub fn friction_history(
         &self,
         pair: FlankPair,
@@ -590,18 +577,12 @@ impl<'a> FlankContact<'a> {
         law: FlankLaw,
         points: &[FlankPoint],
     ) -> FrictionHistory {
-        let field = self.local_field(pair, at);
-        // An open pair has no pressure anyway.
-        let later = self.bearing(pair, &field, law, points).map_or(0.0, |bearing| bearing.later_mm);
-        points
-            .iter()
-            .map(|point| {
-                let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
-                let foot = self.foot(pair, &field, x);
-                let pressure = (-law.stiffness * (foot.distance + later)).max(0.0);
-                (point.arc, traction(law, pressure, point, foot.arc).0)
-            })
-            .collect()
+        let Some((_, touches)) = self.touches(pair, at, law, points) else { return FrictionHistory::new() };
+        let history = |(point, touch): (&FlankPoint, &BearingPoint)| {
+            let pressure = (-law.stiffness * touch.place.gap).max(0.0);
+            (point.arc, traction(law, pressure, point, touch.foot_arc).0)
+        };
+        points.iter().zip(&touches).map(history).collect()
     }
 
     /// Largest pressure of a pair, MPa, by its force and the shape of its gap ([`super::contact_modulus_mpa`]); where
@@ -633,7 +614,7 @@ impl<'a> FlankContact<'a> {
         // On the circular spline the tip lies inward.
         let space_tip_to = space.junction_radius + space.rounding_radius;
         let (mut load, mut on_tips, mut reach_mm) = (0.0, [0.0; 2], f64::NEG_INFINITY);
-        for BearingPoint { place: FacePoint { arc, force, .. }, radius, foot_radius } in &touches {
+        for BearingPoint { place: FacePoint { arc, force, .. }, radius, foot_radius, .. } in &touches {
             reach_mm = reach_mm.max(radius - space.tip_radius);
             load += force;
             on_tips[0] += if *arc >= tooth_tip_from { *force } else { 0.0 };
@@ -662,7 +643,7 @@ impl<'a> FlankContact<'a> {
             let foot = self.foot(pair, &field, x);
             let gap = foot.distance + bearing.later_mm;
             let place = FacePoint { arc: point.arc, gap, force: law.stiffness * point.weight * (-gap).max(0.0) };
-            BearingPoint { place, radius: x[0].hypot(x[1]), foot_radius: foot.radius }
+            BearingPoint { place, radius: x[0].hypot(x[1]), foot_radius: foot.radius, foot_arc: foot.arc }
         };
         let touches = points.iter().map(touch).collect();
         Some((bearing, touches))
@@ -742,16 +723,9 @@ impl<'a> FlankContact<'a> {
             }
             let out = out.get_or_insert_with(|| PairContribution {
                 force: vec![0.0; n],
-                torque: 0.0,
                 stiffness: vec![0.0; n * n],
                 border: vec![0.0; n],
-                corner: 0.0,
-                peak: 0.0,
-                resultant: [0.0; 2],
-                attack: [0.0; 2],
-                slipping: Vec::new(),
-                load: 0.0,
-                along_face: None,
+                ..PairContribution::default()
             });
             let pressure = -law.stiffness * gap;
             out.peak = out.peak.max(pressure);

@@ -4,6 +4,8 @@
 //! 7), so that the direction never jumps. The distance from a point to an arc is a closed form; which arc is nearest is
 //! a search over the joints.
 
+use super::placement::rotate;
+
 /// One arc; straight where its curvature is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Arc {
@@ -47,11 +49,6 @@ fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// `tangent` turned left by the angle of this sine and cosine.
-fn turned(tangent: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
-    [cos * tangent[0] - sin * tangent[1], sin * tangent[0] + cos * tangent[1]]
-}
-
 impl Arc {
     /// From a point and a unit tangent to another point.
     fn to(start: [f64; 2], tangent: [f64; 2], end: [f64; 2], from: f64) -> Arc {
@@ -67,12 +64,12 @@ impl Arc {
     fn point(&self, s: f64) -> [f64; 2] {
         let half = 0.5 * self.curvature * s;
         let chord = if half.abs() < 1e-4 { s * (1.0 - half * half / 6.0) } else { s * half.sin() / half };
-        let [x, y] = turned(self.tangent, half.sin_cos());
+        let [x, y] = rotate(self.tangent, half.sin_cos());
         [self.start[0] + chord * x, self.start[1] + chord * y]
     }
 
     fn tangent_at(&self, s: f64) -> [f64; 2] {
-        turned(self.tangent, (self.curvature * s).sin_cos())
+        rotate(self.tangent, (self.curvature * s).sin_cos())
     }
 
     fn foot(&self, p: [f64; 2]) -> ChainFoot {
@@ -86,7 +83,7 @@ impl Arc {
         ChainFoot {
             left: (2.0 * left - k * (along * along + left * left)) / (1.0 + reach),
             arc: self.from + arc,
-            tangent: turned(self.tangent, (sin / reach, cos / reach)),
+            tangent: rotate(self.tangent, (sin / reach, cos / reach)),
         }
     }
 }

@@ -14,7 +14,7 @@
 //! All of them but one are exact offsets of the surfaces in contact, against meshes that stay nominal: teeth and spaces
 //! are displaced and turned as rigid bodies ([`super::FlankDeviations`]), a worn flank lies deeper along its normal,
 //! the outline of the generator is displaced and deformed ([`super::GeneratorOutline`]), the axis of the circular
-//! spline stands beside that of the housing. What the mesh then misses is the change of stiffness by a change of shape,
+//! spline is offset from that of the housing. The mesh then misses the change of stiffness by a change of shape,
 //! and that is small: a tooth is 0.8 mm thick and gives way by 1 to 2 µm at rated load, so that 5 µm of shape are below
 //! a hundredth of nearly nothing. Measured (cam, coarse mesh, `tests/as_built.rs`): 5 µm taken off every flank, once as
 //! an offset and once in the mesh, leave the output 0.02″ apart at 2 N·m and 0.04″ apart at 100 N·m, where it stands at
@@ -24,15 +24,16 @@
 //! An imperfect drive does not repeat from tooth to tooth any more. What still does, with period `2 pi / z_f` in the
 //! generator angle: any generator (a constant shape), uniform wear, a difference in temperature.
 
+use super::sleeve::{Choice, choice};
 use super::spec::Drive;
 use crate::toml_file::Problem;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::f64::consts::PI;
 
 /// Imperfections of a drive as built; all zero or empty is the ideal drive. Field names are the keys of `[as_built]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AsBuilt {
-    /// How far the toothing of the circular spline stands beside the axis it turns about, µm.
+    /// How far the toothing of the circular spline is offset from the axis it turns about, µm.
     pub circular_spline_eccentricity_um: f64,
     /// Whereto, degrees on the circular spline.
     pub circular_spline_eccentricity_phase_deg: f64,
@@ -47,12 +48,12 @@ pub struct AsBuilt {
     /// Position error of each space of the circular spline, µm, space 0 first; none, or one for each. Adds to the
     /// harmonics.
     pub circular_spline_pitch_error_um: Vec<f64>,
-    /// How far the axis that the circular spline turns about stands beside the axis of the housing, about which the
+    /// How far the axis that the circular spline turns about is offset from the axis of the housing, about which the
     /// generator turns, µm: misalignment, or what a side load makes of the output bearing.
     pub circular_spline_offset_um: f64,
     /// Whereto, degrees in the housing.
     pub circular_spline_offset_direction_deg: f64,
-    /// How far the toothing of the flexspline stands beside the axis of its bore, µm. This is its kinematic part; the
+    /// How far the toothing of the flexspline is offset from the axis of its bore, µm. This is its kinematic part; the
     /// wall that is then thicker on one side is order 1 of [`AsBuilt::rim_thickness_harmonics`], which has the same
     /// kinematic part and takes the place of this one.
     pub flexspline_runout_um: f64,
@@ -65,7 +66,7 @@ pub struct AsBuilt {
     /// Thickness of the flexspline's rim by harmonic. The teeth are true, the bore is not: where the rim is thicker,
     /// the bore stands further in.
     pub rim_thickness_harmonics: Vec<Harmonic>,
-    /// How far the generator stands beside the axis it turns about, µm.
+    /// How far the generator is offset from the axis it turns about, µm.
     pub generator_eccentricity_um: f64,
     /// Whereto, degrees on the generator.
     pub generator_eccentricity_phase_deg: f64,
@@ -112,46 +113,25 @@ pub(super) fn sum_at(harmonics: &[Harmonic], angle_rad: f64) -> f64 {
     harmonics.iter().map(|harmonic| harmonic.at(angle_rad)).sum()
 }
 
-/// A wheel of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Wheel {
-    /// The external one.
-    Flexspline,
-    /// The internal one.
-    CircularSpline,
-}
-
-impl Wheel {
-    /// Its name in a file.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Wheel::Flexspline => "flexspline",
-            Wheel::CircularSpline => "circular_spline",
-        }
+choice! {
+    /// A wheel of the drive.
+    Wheel {
+        /// The external one.
+        Flexspline = "flexspline",
+        /// The internal one.
+        CircularSpline = "circular_spline",
     }
 }
 
-/// Flanks of a tooth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DamagedFlank {
-    /// The one on the counter-clockwise side of the tooth.
-    Plus,
-    /// The one on its clockwise side.
-    Minus,
-    /// Both.
-    Both,
-}
-
-impl DamagedFlank {
-    /// Its name in a file.
-    pub const fn name(self) -> &'static str {
-        match self {
-            DamagedFlank::Plus => "plus",
-            DamagedFlank::Minus => "minus",
-            DamagedFlank::Both => "both",
-        }
+choice! {
+    /// Flanks of a tooth.
+    DamagedFlank {
+        /// The one on the counter-clockwise side of the tooth.
+        Plus = "plus",
+        /// The one on its clockwise side.
+        Minus = "minus",
+        /// Both.
+        Both = "both",
     }
 }
 

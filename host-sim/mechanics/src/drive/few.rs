@@ -94,80 +94,69 @@ impl FewNumbers {
         let mut made = MadeDrive { drive: like.clone(), formulas: Vec::new() };
         let drive = &mut made.drive;
         drive.name = name.to_owned();
-        let mut put = |field: &mut f64, path, value: f64, formula: String| {
-            *field = rounded(value);
+        let mut put = |drive: &mut Drive, path: &'static str, value: f64, formula: String| {
+            *drive.number_mut(path).expect("the path of a number") = rounded(value);
             made.formulas.push((path, formula));
         };
 
         let circles = format!("pitch radius: module x teeth / 2 = {}", rounded(inner));
         let f = &mut drive.flexspline;
         (f.teeth, f.module_mm, f.profile_shift) = (self.teeth, m, SHIFT);
+        put(drive, "flexspline.root_radius_mm", inner + ROOT * m, format!("{circles}; + {ROOT} modules"));
         put(
-            &mut f.root_radius_mm,
-            "flexspline.root_radius_mm",
-            inner + ROOT * m,
-            format!("{circles}; + {ROOT} modules"),
-        );
-        put(
-            &mut f.tip_radius_mm,
+            drive,
             "flexspline.tip_radius_mm",
             inner + flexspline_tip * m,
             format!("pitch radius + {flexspline_tip} modules"),
         );
+        let root_mm = drive.flexspline.root_radius_mm;
         let (rim_mm, why) = match self.bore_mm {
-            Some(bore) => (f.root_radius_mm - 0.5 * bore, format!("root radius - half the bore of {bore}")),
+            Some(bore) => (root_mm - 0.5 * bore, format!("root radius - half the bore of {bore}")),
             None => (like.flexspline.rim_thickness_mm * scale, "0.02553 pitch radii, as HHD-95".to_owned()),
         };
-        if !(rim_mm >= 0.005 * inner && rim_mm <= 0.2 * f.root_radius_mm) {
-            let bore = |rim: f64| rounded(2.0 * (f.root_radius_mm - rim));
+        if !(rim_mm >= 0.005 * inner && rim_mm <= 0.2 * root_mm) {
+            let bore = |rim: f64| rounded(2.0 * (root_mm - rim));
             let what = format!(
                 "found {}: the root circle has the diameter {}, so the rim would be {} mm thick; allowed: {} to {}",
                 self.bore_mm.unwrap_or_default(),
-                rounded(2.0 * f.root_radius_mm),
+                rounded(2.0 * root_mm),
                 rounded(rim_mm),
-                bore(0.2 * f.root_radius_mm),
+                bore(0.2 * root_mm),
                 bore(0.005 * inner),
             );
             return Err(Problem::of("bore", what).into());
         }
-        put(&mut f.rim_thickness_mm, "flexspline.rim_thickness_mm", rim_mm, why);
+        put(drive, "flexspline.rim_thickness_mm", rim_mm, why);
         let width_mm = like.flexspline.width_mm * scale;
-        put(&mut f.width_mm, "flexspline.width_mm", width_mm, "0.4255 pitch radii, as HHD-95".to_owned());
-        put(&mut f.root_fillet_mm, "flexspline.root_fillet_mm", 0.24 * m, "0.24 modules".to_owned());
-        put(&mut f.tip_rounding_mm, "flexspline.tip_rounding_mm", 0.06 * m, "0.06 modules".to_owned());
-        let bore_radius_mm = f.bore_radius_mm();
+        put(drive, "flexspline.width_mm", width_mm, "0.4255 pitch radii, as HHD-95".to_owned());
+        put(drive, "flexspline.root_fillet_mm", 0.24 * m, "0.24 modules".to_owned());
+        put(drive, "flexspline.tip_rounding_mm", 0.06 * m, "0.06 modules".to_owned());
+        let bore_radius_mm = drive.flexspline.bore_radius_mm();
 
-        let c = &mut drive.circular_spline;
-        (c.teeth, c.module_mm) = (self.teeth + 2, m);
+        (drive.circular_spline.teeth, drive.circular_spline.module_mm) = (self.teeth + 2, m);
         let circles = format!("pitch radius: module x teeth / 2 = {}", rounded(outer));
         put(
-            &mut c.root_radius_mm,
+            drive,
             "circular_spline.root_radius_mm",
             outer + circular_spline_root * m,
             format!("{circles}; + {circular_spline_root} modules"),
         );
-        put(
-            &mut c.tip_radius_mm,
-            "circular_spline.tip_radius_mm",
-            outer + TIP * m,
-            format!("pitch radius + {TIP} modules"),
-        );
+        put(drive, "circular_spline.tip_radius_mm", outer + TIP * m, format!("pitch radius + {TIP} modules"));
         let outer_mm = outer * like.circular_spline.outer_radius_mm / (pitch_radius_mm + like.flexspline.module_mm);
-        // Fewer teeth are larger beside the ring.
-        let outer_mm = outer_mm.max(c.root_radius_mm + 4.0 * m);
+        // Fewer teeth are larger in proportion to the ring.
+        let outer_mm = outer_mm.max(drive.circular_spline.root_radius_mm + 4.0 * m);
         put(
-            &mut c.outer_radius_mm,
+            drive,
             "circular_spline.outer_radius_mm",
             outer_mm,
             "1.126 pitch radii, as HHD-95; at least 4 modules outside the root".to_owned(),
         );
-        put(&mut c.root_fillet_mm, "circular_spline.root_fillet_mm", 0.16 * m, "0.16 modules".to_owned());
-        put(&mut c.tip_rounding_mm, "circular_spline.tip_rounding_mm", 0.06 * m, "0.06 modules".to_owned());
+        put(drive, "circular_spline.root_fillet_mm", 0.16 * m, "0.16 modules".to_owned());
+        put(drive, "circular_spline.tip_rounding_mm", 0.06 * m, "0.06 modules".to_owned());
 
-        let g = &mut drive.generator;
-        put(&mut g.w0_mm, "generator.w0_mm", m, "half the difference of the pitch diameters: one module".to_owned());
+        put(drive, "generator.w0_mm", m, "half the difference of the pitch diameters: one module".to_owned());
         put(
-            &mut g.roller_diameter_mm,
+            drive,
             "generator.roller_diameter_mm",
             like.generator.roller_diameter_mm * bore_radius_mm / like.flexspline.bore_radius_mm(),
             "0.557 bore radii, as HHD-95".to_owned(),

@@ -30,27 +30,45 @@ pub(super) enum Slot<'a> {
     Damage(&'a mut Vec<DamagedTooth>),
 }
 
-/// A copy of what a field holds.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Value {
-    Number(f64),
-    Rigid,
-    Word { chosen: &'static str, names: Vec<&'static str> },
-    List(Vec<f64>),
-    Harmonics(Vec<Harmonic>),
-    Damage(Vec<DamagedTooth>),
-}
-
-impl Value {
+impl Slot<'_> {
     /// True for zero, for an empty list, for a load that is even and for involutes.
     pub(crate) fn is_zero(&self) -> bool {
         match self {
-            Value::Number(number) => *number == 0.0,
-            Value::Rigid => false,
-            Value::Word { chosen, .. } => *chosen == FaceLoad::Even.name() || *chosen == Profile::Involute.name(),
-            Value::List(list) => list.is_empty(),
-            Value::Harmonics(list) => list.is_empty(),
-            Value::Damage(list) => list.is_empty(),
+            Slot::Real(number) => **number == 0.0,
+            Slot::RealOrRigid(number) => **number == Some(0.0),
+            Slot::Count(number) => **number == 0,
+            Slot::Word(word) => [FaceLoad::Even.name(), Profile::Involute.name()].contains(&word.chosen()),
+            Slot::List(list) => list.is_empty(),
+            Slot::Harmonics(list) => list.is_empty(),
+            Slot::Damage(list) => list.is_empty(),
+        }
+    }
+
+    /// Every number that has a range of its own, `range` being that of the field: where it stands within the value, the
+    /// number, the range.
+    pub(crate) fn ranged<'f>(&self, range: &'f Allowed) -> Vec<(String, f64, &'f Allowed)> {
+        let whole = |number: f64| vec![(String::new(), number, range)];
+        match self {
+            Slot::Real(number) => whole(**number),
+            Slot::Count(number) => whole(f64::from(**number)),
+            Slot::RealOrRigid(number) => number.map_or(Vec::new(), whole),
+            Slot::Word(_) => Vec::new(),
+            Slot::List(list) => list.iter().enumerate().map(|(k, x)| (format!("[{k}]"), *x, range)).collect(),
+            Slot::Harmonics(list) => list
+                .iter()
+                .enumerate()
+                .flat_map(|(k, harmonic)| {
+                    [
+                        (format!("[{k}].order"), f64::from(harmonic.order), &ORDER),
+                        (format!("[{k}].amplitude_um"), harmonic.amplitude_um, range),
+                        (format!("[{k}].phase_deg"), harmonic.phase_deg, &PHASE),
+                    ]
+                })
+                .collect(),
+            Slot::Damage(list) => {
+                let depth = |(k, tooth): (usize, &DamagedTooth)| (format!("[{k}].depth_um"), tooth.depth_um, range);
+                list.iter().enumerate().map(depth).collect()
+            }
         }
     }
 }
@@ -214,9 +232,9 @@ impl Field {
     }
 
     /// Meaning, unit, sign and what is allowed, for the comment in a written file.
-    pub(crate) fn comment(&self) -> String {
+    pub(crate) fn comment(&self, slot: &Slot<'_>) -> String {
         let range = &self.range;
-        let allowed = match self.slot(&mut Drive::hhd_95()) {
+        let allowed = match slot {
             Slot::Real(_) => range.to_string(),
             Slot::RealOrRigid(_) => format!("{range} or \"rigid\""),
             Slot::Count(_) => format!("a whole number, {range}"),
@@ -281,74 +299,7 @@ impl Drive {
 }
 
 /// Calls `visit` with every field and its value.
-pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, &Value)) {
+pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, Slot<'_>)) {
     let mut drive = drive.clone();
-    for field in ALL {
-        let value = match field.slot(&mut drive) {
-            Slot::Real(number) => Value::Number(*number),
-            Slot::RealOrRigid(number) => number.map_or(Value::Rigid, Value::Number),
-            Slot::Count(number) => Value::Number(f64::from(*number)),
-            Slot::Word(word) => Value::Word { chosen: word.chosen(), names: word.names() },
-            Slot::List(list) => Value::List(list.clone()),
-            Slot::Harmonics(list) => Value::Harmonics(list.clone()),
-            Slot::Damage(list) => Value::Damage(list.clone()),
-        };
-        visit(field, &value);
-    }
-}
-
-/// Every number of a value that has a range of its own: where it stands within the value, the number, the range.
-pub(super) fn ranged<'f>(field: &'f Field, value: &Value) -> Vec<(String, f64, &'f Allowed)> {
-    match value {
-        Value::Number(number) => vec![(String::new(), *number, &field.range)],
-        Value::Rigid | Value::Word { .. } => Vec::new(),
-        Value::List(list) => list.iter().enumerate().map(|(k, x)| (format!("[{k}]"), *x, &field.range)).collect(),
-        Value::Harmonics(list) => list
-            .iter()
-            .enumerate()
-            .flat_map(|(k, harmonic)| {
-                [
-                    (format!("[{k}].order"), f64::from(harmonic.order), &ORDER),
-                    (format!("[{k}].amplitude_um"), harmonic.amplitude_um, &field.range),
-                    (format!("[{k}].phase_deg"), harmonic.phase_deg, &PHASE),
-                ]
-            })
-            .collect(),
-        Value::Damage(list) => list
-            .iter()
-            .enumerate()
-            .map(|(k, tooth)| (format!("[{k}].depth_um"), tooth.depth_um, &field.range))
-            .collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_field_says_its_unit_its_sign_and_its_range() {
-        for field in ALL {
-            let (section, key) = field.split();
-            assert!(SECTIONS.iter().any(|(name, _)| *name == section), "{section} is not described");
-            let comment = field.comment();
-            let allowed = if field.range == NO_NUMBER { ", \"" } else { " to " };
-            assert!(comment.contains(allowed) && comment.len() > 20, "{comment}");
-            let units = [
-                ("_mm", "mm"),
-                ("_um", "µm"),
-                ("_deg", "degrees"),
-                ("_n_m", "N.m"),
-                ("_mpa", "MPa"),
-                ("_per_k", "1/K"),
-            ];
-            for (ending, unit) in units {
-                assert!(!key.ends_with(ending) || comment.contains(unit), "{key}: {comment}");
-            }
-            // Temperatures need no word for their sign.
-            let signed = field.range.low < 0.0 && !key.ends_with("_c");
-            let said = ["positive", "negative"].iter().any(|sign| comment.contains(sign));
-            assert!(!signed || said, "{}: which way is positive? {comment}", field.path);
-        }
-    }
+    ALL.iter().for_each(|field| visit(field, field.slot(&mut drive)));
 }

@@ -15,7 +15,7 @@
 
 use super::as_built::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
 use super::error::DriveError;
-use super::fields::{self, DEPTH, Field, ORDER, PHASE, Slot, TOOTH, Value};
+use super::fields::{self, DEPTH, Field, ORDER, PHASE, Slot, TOOTH};
 use super::ring::GeneratorKind;
 use super::spec::{Drive, ThermalState};
 use crate::suggest::{did_you_mean, likeliest, likeliest_path, question};
@@ -123,19 +123,19 @@ impl Drive {
             format!("name = {}", toml::Value::String(drive.name.clone()))
         );
         let mut open = "";
-        fields::for_each(drive, |field, value| {
+        fields::for_each(drive, |field, slot| {
             let (section, key) = field.split();
             if section != open {
                 let about = fields::SECTIONS.iter().find(|(name, _)| *name == section).map_or("", |(_, about)| about);
                 let _ = writeln!(text, "\n[{section}]  # {about}");
                 open = section;
             }
-            let value = match value {
-                Value::Rigid => "\"rigid\"".to_owned(),
-                Value::Word { chosen, .. } => format!("{chosen:?}"),
-                Value::Number(number) if field.is_count() => format!("{number}"),
-                Value::Number(number) => format!("{number:?}"),
-                Value::List(list) => {
+            let value = match &slot {
+                Slot::Real(number) => format!("{number:?}"),
+                Slot::RealOrRigid(number) => number.map_or("\"rigid\"".to_owned(), |number| format!("{number:?}")),
+                Slot::Count(number) => number.to_string(),
+                Slot::Word(word) => format!("{:?}", word.chosen()),
+                Slot::List(list) => {
                     // ten to a line: as many as there are teeth
                     let lines: Vec<String> = list
                         .chunks(10)
@@ -143,28 +143,23 @@ impl Drive {
                         .collect();
                     if lines.is_empty() { "[]".to_owned() } else { format!("[\n    {},\n]", lines.join(",\n    ")) }
                 }
-                Value::Harmonics(list) => array(list.iter().map(|harmonic| {
+                Slot::Harmonics(list) => array(list.iter().map(|harmonic| {
                     let Harmonic { order, amplitude_um, phase_deg } = harmonic;
                     format!("{{ order = {order}, amplitude_um = {amplitude_um:?}, phase_deg = {phase_deg:?} }}")
                 })),
-                Value::Damage(list) => array(list.iter().map(|damaged| {
+                Slot::Damage(list) => array(list.iter().map(|damaged| {
                     let DamagedTooth { wheel, tooth, flank, depth_um } = damaged;
                     let (wheel, flank) = (wheel.name(), flank.name());
                     format!("{{ wheel = \"{wheel}\", tooth = {tooth}, flank = \"{flank}\", depth_um = {depth_um:?} }}")
                 })),
             };
-            let _ = writeln!(text, "{:<44} # {}", format!("{key} = {value}"), field.comment());
+            let _ = writeln!(text, "{:<44} # {}", format!("{key} = {value}"), field.comment(&slot));
         });
         text
     }
 }
 
 impl Field {
-    /// True for a whole number.
-    fn is_count(&self) -> bool {
-        matches!(self.slot(&mut Drive::hhd_95()), Slot::Count(_))
-    }
-
     /// Stores `value` in `drive` if its type and range are right; says what is wrong otherwise.
     fn put(&self, drive: &mut Drive, value: &Spanned<DeValue>) -> Result<(), Refused> {
         match self.slot(drive) {
@@ -198,14 +193,12 @@ impl Field {
             Slot::Damage(slot) => {
                 *slot = each_of(value, "an array of { wheel, tooth, flank, depth_um }", |entry| {
                     let entry = Entries::of(entry, &["wheel", "tooth", "flank", "depth_um"])?;
-                    let wheels = [Wheel::Flexspline, Wheel::CircularSpline].map(|wheel| (wheel.name(), wheel));
-                    let flanks = [DamagedFlank::Plus, DamagedFlank::Minus, DamagedFlank::Both];
+                    let wheels: Vec<_> = Wheel::ALL.iter().map(|wheel| (wheel.name(), *wheel)).collect();
+                    let flanks: Vec<_> = DamagedFlank::ALL.iter().map(|flank| (flank.name(), *flank)).collect();
                     Ok(DamagedTooth {
                         wheel: entry.needed("wheel", |v| one_of(&wheels, v))?,
                         tooth: entry.needed("tooth", |v| whole(&TOOTH, v))?,
-                        flank: entry
-                            .given("flank", |v| one_of(&flanks.map(|flank| (flank.name(), flank)), v))?
-                            .unwrap_or(DamagedFlank::Both),
+                        flank: entry.given("flank", |v| one_of(&flanks, v))?.unwrap_or(DamagedFlank::Both),
                         depth_um: entry.needed("depth_um", |v| real(&DEPTH, v))?,
                     })
                 })?;
@@ -257,7 +250,7 @@ impl DriveReader<'_> {
         };
         for (key, value) in table {
             let section = key.get_ref().as_ref();
-            // What a diagnosis found that no field holds stands in [extension], what a catalogue says in [data_sheet]:
+            // [extension] holds findings of a diagnosis that are no fields, [data_sheet] values of a catalogue:
             // others read them.
             if ["base", "name", "extension", "data_sheet"].contains(&section) {
                 continue;

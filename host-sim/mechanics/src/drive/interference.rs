@@ -16,7 +16,7 @@
 use super::as_built::{direction, sum_at};
 use super::error::DriveError;
 use super::neutral::NeutralCurve;
-use super::placement::FlankDeviations;
+use super::placement::{FlankDeviations, rotate};
 use super::ring::GeneratorKind;
 use super::spec::Drive;
 use super::tooth::{OutlinePiece, PieceKind, ToothFlank};
@@ -90,8 +90,6 @@ pub struct FlankGap {
 fn piece_name<S: serde::Serializer>(piece: &PieceKind, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(piece.name())
 }
-
-impl FlankGap {}
 
 impl fmt::Display for FlankGap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -181,10 +179,9 @@ impl RigidMesh {
     /// tips of the circular spline.
     pub(crate) fn gap(&self, phi: f64, side: Side) -> Option<FlankGap> {
         // the place of the tooth seen from the axis of its space
-        let ([x, y], normal) = self.curve.position(phi);
+        let (position, normal) = self.curve.position(phi);
         let space_axis = phi * self.flexspline_teeth / self.circular_spline_teeth;
-        let (s, c) = space_axis.sin_cos();
-        let foot = [x * c + y * s, y * c - x * s];
+        let foot = rotate(position, (-space_axis).sin_cos());
         let (s, c) = (normal - space_axis).sin_cos();
         let sign = if side == Side::Plus { 1.0 } else { -1.0 };
         let (_, space_tip) = self.space.root_and_tip_radius();
@@ -301,10 +298,6 @@ impl RigidMesh {
         let built = &drive.as_built;
         let cycles = Side::BOTH.map(|side| self.cycle(side));
         let (teeth, spaces) = (moved.teeth.len(), moved.spaces.len());
-        let turn = |[x, y]: [f64; 2], angle: f64| {
-            let (s, c) = angle.sin_cos();
-            [c * x + s * y, c * y - s * x]
-        };
         let eccentric =
             direction(built.generator_eccentricity_phase_deg).map(|x| 1e-3 * built.generator_eccentricity_um * x);
         let ratio = self.circular_spline_teeth / (self.circular_spline_teeth - self.flexspline_teeth);
@@ -320,21 +313,21 @@ impl RigidMesh {
                 let space = (tooth as i64 + lobe as i64).rem_euclid(spaces as i64) as usize;
                 let from_lobe = phi - PI * lobe;
                 let axis = psi + PI * lobe + from_lobe * self.flexspline_teeth / self.circular_spline_teeth;
-                let beside = moved.spaces[space];
-                let of_axis = turn(moved.axis, axis);
-                let of_generator = turn(eccentric, axis - psi);
+                let space_at = moved.spaces[space];
+                let of_axis = rotate(moved.axis, (-axis).sin_cos());
+                let of_generator = rotate(eccentric, (psi - axis).sin_cos());
                 let mut out = 1e-3 * sum_at(&built.rim_thickness_harmonics, TAU * tooth as f64 / teeth as f64)
                     + 0.5e-3 * built.generator_lobe_asymmetry_um * phi.cos();
                 if generator == GeneratorKind::Cam {
                     out += 1e-3 * sum_at(&built.cam_form_harmonics, phi);
                 }
-                let radial = at.translation[0] - beside.translation[0] - of_axis[0] + of_generator[0] + out;
+                let radial = at.translation[0] - space_at.translation[0] - of_axis[0] + of_generator[0] + out;
                 for side in Side::BOTH {
                     let Some(nearest) = at_phase(&cycles[side.index()], from_lobe) else { continue };
                     let r = nearest.radius_mm;
-                    let along = at.translation[1] - beside.translation[1] - of_axis[1]
+                    let along = at.translation[1] - space_at.translation[1] - of_axis[1]
                         + of_generator[1]
-                        + r * (at.turn.0 - beside.turn.0);
+                        + r * (at.turn.0 - space_at.turn.0);
                     let k = side.index();
                     let missing = moved.tooth_depth[tooth][k] + moved.space_depth[space][k];
                     let gap = nearest.gap_rad + nearest.by_radius * radial - side.sign() * along / r
@@ -416,7 +409,7 @@ mod tests {
         RigidMesh::new(drive, kind).unwrap().report(kind).unwrap()
     }
 
-    /// An ideal drive has the room of its backlash at the tightest phase. A spline beside its axis, or an oval one,
+    /// An ideal drive has the room of its backlash at the tightest phase. A spline off its axis, or an oval one,
     /// presses teeth into their spaces: the room falls by twice what the flank's lean makes of the displacement, or
     /// more; wear opens it by its depth on both flanks of both wheels.
     #[test]

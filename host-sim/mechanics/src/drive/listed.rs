@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::fields::{self, Slot, Value};
+use super::fields::{self, Slot};
 use super::spec::Drive;
 
 /// A field of a drive.
@@ -44,25 +44,22 @@ impl Drive {
     /// Every field in the order of a written file, with its value.
     pub fn fields(&self) -> Vec<ListedField> {
         let mut listed = Vec::new();
-        fields::for_each(self, |field, value| {
-            let kind = match field.slot(&mut self.clone()) {
-                Slot::Real(_) => FieldKind::Number,
-                Slot::RealOrRigid(_) => FieldKind::NumberOrRigid,
-                Slot::Count(_) => FieldKind::Count,
-                Slot::Word(_) => FieldKind::Word,
-                Slot::List(_) | Slot::Harmonics(_) | Slot::Damage(_) => FieldKind::List,
+        fields::for_each(self, |field, slot| {
+            let (kind, value) = match &slot {
+                Slot::Real(number) => (FieldKind::Number, Some(number.to_string())),
+                Slot::RealOrRigid(number) => {
+                    (FieldKind::NumberOrRigid, Some(number.map_or("rigid".to_owned(), |number| number.to_string())))
+                }
+                Slot::Count(number) => (FieldKind::Count, Some(number.to_string())),
+                Slot::Word(word) => (FieldKind::Word, Some(word.chosen().to_owned())),
+                Slot::List(_) | Slot::Harmonics(_) | Slot::Damage(_) => (FieldKind::List, None),
             };
-            let (text, words) = match value {
-                Value::Number(number) => (Some(number.to_string()), Vec::new()),
-                Value::Rigid => (Some("rigid".to_owned()), Vec::new()),
-                Value::Word { chosen, names } => (Some((*chosen).to_owned()), names.clone()),
-                Value::List(_) | Value::Harmonics(_) | Value::Damage(_) => (None, Vec::new()),
-            };
+            let words = if let Slot::Word(word) = slot { word.names() } else { Vec::new() };
             let numeric = matches!(kind, FieldKind::Number | FieldKind::NumberOrRigid | FieldKind::Count);
             listed.push(ListedField {
                 path: field.path,
                 meaning: field.meaning,
-                value: text,
+                value,
                 kind,
                 range: numeric.then_some([field.range.low, field.range.high]),
                 words,

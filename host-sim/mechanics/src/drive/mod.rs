@@ -38,7 +38,7 @@ pub(crate) use interference::golden;
 pub use interference::{FlankGap, MeshReport, RigidMesh, Room, Side};
 pub use listed::{FieldKind, ListedField};
 pub use neutral::NeutralCurve;
-pub use placement::{FlankDeviations, Placement};
+pub use placement::{FlankDeviations, Placement, rotate};
 pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
 pub use sleeve::{Bottom, FaceLoad, Flange, Profile, Sleeve, SleeveKind};
 pub use spec::{

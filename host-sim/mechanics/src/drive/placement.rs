@@ -1,4 +1,4 @@
-//! Where the flanks of an as-built drive stand beside those of the ideal one.
+//! Offsets of the flanks of an as-built drive from those of the ideal one.
 //!
 //! Teeth and spaces are rigid bodies of their own here: each is turned about the axis of its wheel and then displaced,
 //! in the frame that has the axis of the ideal tooth or space along +x. What is worn or broken off a flank opens the
@@ -8,6 +8,12 @@ use super::as_built::{DamagedFlank, Wheel, direction, oval, sum_at};
 use super::interference::Side;
 use super::spec::Drive;
 use std::f64::consts::TAU;
+
+/// Rotates a vector by the angle of this sine and cosine.
+#[inline]
+pub fn rotate(v: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
+    [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1]]
+}
 
 /// A rigid displacement in the plane: `x -> R x + translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +43,7 @@ impl Placement {
     /// Where a point of the ideal part is.
     #[inline]
     pub fn place(&self, p: [f64; 2]) -> [f64; 2] {
-        let turned = self.turned(p);
+        let turned = rotate(p, self.turn);
         [turned[0] + self.translation[0], turned[1] + self.translation[1]]
     }
 
@@ -45,15 +51,7 @@ impl Placement {
     #[inline]
     pub(crate) fn recover(&self, p: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = self.turn;
-        let d = [p[0] - self.translation[0], p[1] - self.translation[1]];
-        [cos * d[0] + sin * d[1], cos * d[1] - sin * d[0]]
-    }
-
-    /// A direction of the ideal part, turned with it.
-    #[inline]
-    pub(crate) fn turned(&self, d: [f64; 2]) -> [f64; 2] {
-        let (sin, cos) = self.turn;
-        [cos * d[0] - sin * d[1], sin * d[0] + cos * d[1]]
+        rotate([p[0] - self.translation[0], p[1] - self.translation[1]], (-sin, cos))
     }
 }
 
@@ -71,7 +69,7 @@ pub struct FlankDeviations {
     /// Axis that the circular spline turns about, in the housing, mm. Its torque is the moment about this axis: that of
     /// its own bearing.
     pub axis: [f64; 2],
-    /// No point of a flank stands further beside its ideal place than this, mm; both wheels and the axis together.
+    /// No point of a flank is further from its ideal place than this, mm; both wheels and the axis together.
     pub largest: f64,
 }
 
@@ -89,7 +87,7 @@ impl FlankDeviations {
                 let angle = TAU * tooth as f64 / f64::from(f.teeth);
                 let along = sum_at(&built.flexspline_pitch_harmonics, angle)
                     + built.flexspline_pitch_error_um.get(tooth).copied().unwrap_or(0.0);
-                Placement { turn: (1e-3 * along / middle).sin_cos(), translation: seen_at(runout, angle) }
+                Placement { turn: (1e-3 * along / middle).sin_cos(), translation: rotate(runout, (-angle).sin_cos()) }
             })
             .collect();
 
@@ -105,7 +103,7 @@ impl FlankDeviations {
                 // The ring turns about its middle circle, not about the axis: the rotation about the axis carries that
                 // circle along by `rotation * middle`, which the translation takes back.
                 let turn = 1e-3 * along / middle + rotation;
-                let [x, y] = seen_at(eccentricity, angle);
+                let [x, y] = rotate(eccentricity, (-angle).sin_cos());
                 Placement { turn: turn.sin_cos(), translation: [x + out, y + aside - middle * rotation] }
             })
             .collect();
@@ -147,12 +145,6 @@ impl FlankDeviations {
         let largest = of(&teeth, f.tip_radius_mm) + of(&spaces, c.root_radius_mm) + axis[0].hypot(axis[1]);
         FlankDeviations { teeth, spaces, tooth_depth, space_depth, axis, largest }
     }
-}
-
-/// A vector of the wheel in the frame of its sector at `angle`.
-fn seen_at(v: [f64; 2], angle: f64) -> [f64; 2] {
-    let (sin, cos) = angle.sin_cos();
-    [cos * v[0] + sin * v[1], cos * v[1] - sin * v[0]]
 }
 
 #[cfg(test)]
@@ -220,7 +212,7 @@ mod tests {
             let [x, y] = placement.place([middle, 0.0]);
             assert!((x - middle - 0.01 * (2.0 * from_crest).cos()).abs() < 1e-5);
             assert!((y + 0.005 * (2.0 * from_crest).sin()).abs() < 1e-6);
-            let d = placement.turned([1.0, 0.0]);
+            let d = rotate([1.0, 0.0], placement.turn);
             assert!((d[1] - 1.5 * 0.01 / middle * (2.0 * from_crest).sin()).abs() < 1e-9);
         }
     }

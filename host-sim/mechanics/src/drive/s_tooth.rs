@@ -20,6 +20,7 @@
 use super::arcs::ArcChain;
 use super::interference::golden;
 use super::neutral::NeutralCurve;
+use super::placement::rotate;
 use super::ring::GeneratorKind;
 use super::spec::Drive;
 use crate::toml_file::Problem;
@@ -124,11 +125,10 @@ impl Cycle {
     /// Angle, seen in the space, at which the flank of the tooth at material angle `phi` crosses the circle of radius
     /// `r`; `None` where it ends below.
     fn angle(&self, phi: f64, r: f64) -> Option<f64> {
-        let ([x, y], normal) = self.curve.position(phi);
+        let (position, normal) = self.curve.position(phi);
         let axis = phi * self.ratio;
-        let (s, c) = axis.sin_cos();
-        let foot = [x * c + y * s, y * c - x * s];
-        let (s, c) = (normal - axis).sin_cos();
+        let foot = rotate(position, (-axis).sin_cos());
+        let turn @ (s, c) = (normal - axis).sin_cos();
         let place = |p: [f64; 2]| {
             let along = p[0] - self.curve.radius_mm();
             [foot[0] + along * c - p[1] * s, foot[1] + along * s + p[1] * c]
@@ -136,8 +136,7 @@ impl Cycle {
         let mut at = 0.5 * self.tooth.length();
         let mut found = [0.0; 2];
         for _ in 0..6 {
-            let t = self.tooth.tangent(at);
-            let direction = [t[0] * c - t[1] * s, t[0] * s + t[1] * c];
+            let direction = rotate(self.tooth.tangent(at), turn);
             found = place(self.tooth.point(at));
             let radius = found[0].hypot(found[1]);
             let rate = ((found[0] * direction[0] + found[1] * direction[1]) / radius).max(0.3);
@@ -266,7 +265,7 @@ mod tests {
             let r = 48.66 + 0.01 * f64::from(k);
             let (angle, _) = cycle.envelope(r).unwrap();
             let foot = chain.foot([r * angle.cos(), r * angle.sin()]);
-            assert!(foot.left.abs() < 1e-5, "{} mm beside the envelope at {r}", foot.left);
+            assert!(foot.left.abs() < 1e-5, "{} mm off the envelope at {r}", foot.left);
         }
     }
 

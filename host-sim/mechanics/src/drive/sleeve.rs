@@ -55,6 +55,7 @@ macro_rules! choice {
         }
     };
 }
+pub(super) use choice;
 
 choice! {
     /// Support of the rim.
@@ -245,19 +246,6 @@ impl Sleeve {
                 format!("found {thickness}, allowed: up to {thickest:.4} (a thin plate)"),
             );
         }
-    }
-
-    /// Its lengths, for whoever scales them.
-    pub(super) fn lengths(&mut self) -> [&mut f64; 7] {
-        [
-            &mut self.wall_mm,
-            &mut self.flange_side_mm,
-            &mut self.bottom_side_mm,
-            &mut self.bottom_thickness_mm,
-            &mut self.diaphragm_thickness_mm,
-            &mut self.diaphragm_width_mm,
-            &mut self.hub_radius_mm,
-        ]
     }
 }
 

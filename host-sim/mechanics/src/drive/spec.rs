@@ -2,7 +2,7 @@
 
 use super::as_built::{AsBuilt, DamagedFlank, Harmonic, Wheel};
 use super::error::DriveError;
-use super::fields::{self, Value};
+use super::fields::{self, Slot};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
 use super::sleeve::{Bottom, FaceLoad, Profile, Sleeve, SleeveKind};
@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A harmonic drive: flexspline fixed, circular spline the output, two waves.
 ///
-/// Nominal sizes, and what the drive as built has beside them. Field names are the keys of the file.
+/// Nominal sizes, and the deviations of the drive as built from them. Field names are the keys of the file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drive {
     /// A label for reports; no part of the physics.
@@ -328,12 +328,12 @@ impl Drive {
     ///
     /// Tolerances that a good workshop leaves; phases are arbitrary. ISO 1328-1 allows, for 50 to 125 mm and this
     /// module, a total cumulative pitch deviation of 18 µm in grade 5; it is largest once or twice around, where work
-    /// and cutter stand beside their axes or the ring is clamped, and falls with the order.
+    /// and cutter are offset from their axes or the ring is clamped, and falls with the order.
     ///
     /// * pitch of the flexspline: 4, 4 and 1.5 µm of orders 1, 2 and 3, 14 µm in all; of the circular spline 5, 4.5 and
     ///   1.5 µm, 17 µm in all: grade 5;
-    /// * runout of the flexspline, eccentricity of the circular spline, its bearing beside the axis of the housing, the
-    ///   generator beside its axis: 3 µm each, 6 µm on a dial where grade 5 allows 15 µm. More would be taken up by the
+    /// * runout of the flexspline, eccentricity of the circular spline, its bearing off the axis of the housing, the
+    ///   generator off its axis: 3 µm each, 6 µm on a dial where grade 5 allows 15 µm. More would be taken up by the
     ///   Oldham coupling, in which a real generator floats; here its axis is held;
     /// * ovality of the circular spline 4 µm: what bolts leave of a round ring of 53.5 mm radius and 4 mm wall;
     /// * one lobe of the generator 3 µm higher, form of the cam 1.5 and 1 µm of orders 3 and 4, 5 µm in all: a ground
@@ -400,7 +400,7 @@ impl Drive {
         Drive { name: "HHD-95-hermetic".to_owned(), sleeve, ..Drive::hhd_95() }
     }
 
-    /// The plane drive: no third dimension, nothing beside the rim but that it does not turn.
+    /// The plane drive: no third dimension, nothing holds the rim but that it does not turn.
     pub fn hhd_95_plane() -> Drive {
         let sleeve = Sleeve { kind: SleeveKind::None, ..Sleeve::default() };
         Drive { name: "HHD-95-plane".to_owned(), sleeve, ..Drive::hhd_95() }
@@ -489,31 +489,17 @@ impl Drive {
     fn in_thermal_state(&self, new: ThermalState) -> Drive {
         let mut drive = self.clone();
         let (t, old, rise) = (&self.temperature, self.thermal_state, new.above_reference_k);
-        let f = &mut drive.flexspline;
-        for length in [
-            &mut f.module_mm,
-            &mut f.root_radius_mm,
-            &mut f.tip_radius_mm,
-            &mut f.rim_thickness_mm,
-            &mut f.width_mm,
-            &mut f.root_fillet_mm,
-            &mut f.tip_rounding_mm,
-        ] {
-            *length *= new.flexspline_scale / old.flexspline_scale;
-        }
-        for length in drive.sleeve.lengths() {
-            *length *= new.flexspline_scale / old.flexspline_scale;
-        }
-        let c = &mut drive.circular_spline;
-        for length in [
-            &mut c.module_mm,
-            &mut c.root_radius_mm,
-            &mut c.tip_radius_mm,
-            &mut c.outer_radius_mm,
-            &mut c.root_fillet_mm,
-            &mut c.tip_rounding_mm,
-        ] {
-            *length *= new.circular_spline_scale / old.circular_spline_scale;
+        for field in fields::ALL {
+            let (section, key) = field.split();
+            let scale = match section {
+                "flexspline" | "sleeve" => new.flexspline_scale / old.flexspline_scale,
+                "circular_spline" => new.circular_spline_scale / old.circular_spline_scale,
+                _ => continue,
+            };
+            let is_length = key.ends_with("_mm") && !key.ends_with("_per_mm");
+            if let (true, Slot::Real(length)) = (is_length, field.slot(&mut drive)) {
+                *length *= scale;
+            }
         }
         drive.material.youngs_modulus_mpa *=
             (1.0 + t.youngs_modulus_per_k * rise) / (1.0 + t.youngs_modulus_per_k * old.above_reference_k);
@@ -526,9 +512,9 @@ impl Drive {
     pub fn hash(&self) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"flexspline drive 1\n");
-        fields::for_each(self, |field, value| {
+        fields::for_each(self, |field, slot| {
             // an imperfection that is not there leaves the hash of the ideal drive, and so does a face that is straight
-            if (field.is_imperfection() || field.is_of_the_face() || field.is_of_the_profile()) && value.is_zero() {
+            if (field.is_imperfection() || field.is_of_the_face() || field.is_of_the_profile()) && slot.is_zero() {
                 return;
             }
             // and so do the sizes of a sleeve that springs stand for
@@ -540,23 +526,24 @@ impl Drive {
             let number = |hasher: &mut blake3::Hasher, number: f64| {
                 hasher.update(&(number + 0.0).to_le_bytes());
             };
-            let mark: &[u8] = if *value == Value::Rigid { b" rigid" } else { b"=" };
+            let mark: &[u8] = if matches!(slot, Slot::RealOrRigid(None)) { b" rigid" } else { b"=" };
             hasher.update(mark);
-            match value {
-                Value::Number(x) => number(&mut hasher, *x),
-                Value::Rigid => {}
-                Value::Word { chosen, .. } => {
-                    hasher.update(chosen.as_bytes());
+            match slot {
+                Slot::Real(x) => number(&mut hasher, *x),
+                Slot::RealOrRigid(x) => x.iter().for_each(|x| number(&mut hasher, *x)),
+                Slot::Count(x) => number(&mut hasher, f64::from(*x)),
+                Slot::Word(word) => {
+                    hasher.update(word.chosen().as_bytes());
                 }
-                Value::List(list) => list.iter().for_each(|x| number(&mut hasher, *x)),
-                Value::Harmonics(list) => {
+                Slot::List(list) => list.iter().for_each(|x| number(&mut hasher, *x)),
+                Slot::Harmonics(list) => {
                     for harmonic in list {
                         hasher.update(&harmonic.order.to_le_bytes());
                         number(&mut hasher, harmonic.amplitude_um);
                         number(&mut hasher, harmonic.phase_deg);
                     }
                 }
-                Value::Damage(list) => {
+                Slot::Damage(list) => {
                     for tooth in list {
                         let wheel = u8::from(tooth.wheel == Wheel::CircularSpline);
                         let flank = match tooth.flank {
@@ -585,8 +572,8 @@ impl Drive {
     /// The same with these generators alone: what the others lack room for is no problem.
     pub(crate) fn check_with(&self, kinds: &[GeneratorKind]) -> Result<(), DriveError> {
         let mut problems = Vec::new();
-        fields::for_each(self, |field, value| {
-            for (at, number, range) in fields::ranged(field, value) {
+        fields::for_each(self, |field, slot| {
+            for (at, number, range) in slot.ranged(&field.range) {
                 if let Some(what) = range.refusal(number) {
                     problems.push(Problem::of(&format!("{}{at}", field.path), what));
                 }

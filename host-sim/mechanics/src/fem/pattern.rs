@@ -12,6 +12,18 @@ pub struct BlockPosition {
     pub column: u32,
 }
 
+impl BlockPosition {
+    /// Adds the entries of a block to the values.
+    #[inline]
+    pub(crate) fn add(&self, entry: impl Fn(usize, usize) -> f64, values: &mut [f64]) {
+        for i in 0..2 {
+            for j in 0..2 {
+                values[self.base as usize + i * self.row as usize + j * self.column as usize] += entry(i, j);
+            }
+        }
+    }
+}
+
 /// Positions of an 8-node element: for nodes `a > b` the block at `a (a-1)/2 + b`, for each node its diagonal block as
 /// positions of (x, x), (y, x), (y, y). Blocks of fixed nodes are absent.
 #[derive(Debug, Clone)]
@@ -29,11 +41,7 @@ impl ElementPositions {
             let row_y = row_x + 2 * a + 1;
             for b in 0..a {
                 if let Some(p) = self.off_diagonal[a * (a - 1) / 2 + b] {
-                    let (base, row, column) = (p.base as usize, p.row as usize, p.column as usize);
-                    values[base] += packed[row_x + 2 * b];
-                    values[base + column] += packed[row_x + 2 * b + 1];
-                    values[base + row] += packed[row_y + 2 * b];
-                    values[base + row + column] += packed[row_y + 2 * b + 1];
+                    p.add(|i, j| packed[[row_x, row_y][i] + 2 * b + j], values);
                 }
             }
             if let Some([xx, yy]) = self.diagonal[a] {

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use super::density::{MeshDensity, MeshLevel};
 use super::sector::{EdgeTag, HalfOutline, HalfSector, MeshError, Point};
-use crate::drive::{ActiveFlank, Drive, RimVariation, Side, ToothFlank};
+use crate::drive::{ActiveFlank, Drive, RimVariation, Side, ToothFlank, rotate};
 use crate::fem::element::{GaussPoint, gauss_points};
 
 /// Which wheel a mesh is of.
@@ -209,16 +209,12 @@ impl WheelMesh {
     fn assemble(kind: WheelKind, teeth: usize, base_radius: f64, half: HalfSector) -> Result<WheelMesh, MeshError> {
         let half_pitch = std::f64::consts::PI / teeth as f64;
         let pitch = 2.0 * half_pitch;
-        let rotate = |p: Point, angle: f64| {
-            let (s, c) = angle.sin_cos();
-            [c * p[0] - s * p[1], s * p[0] + c * p[1]]
-        };
         // The half sector as it stands lies on the plus side of a tooth; about a space it is the minus side, turned by
         // half a pitch. Its mirror image is the other half.
         let upper = |p: Point| match kind {
             WheelKind::Flexspline => p,
             WheelKind::CircularSpline => {
-                let q = rotate(p, -half_pitch);
+                let q = rotate(p, (-half_pitch).sin_cos());
                 [q[0], -q[1]]
             }
         };
@@ -265,8 +261,8 @@ impl WheelMesh {
         let mut all_nodes = Vec::with_capacity(nodes_per_sector * teeth);
         let mut elements = Vec::with_capacity(template.len() * teeth);
         for sector in 0..teeth {
-            let angle = TAU * sector as f64 / teeth as f64;
-            all_nodes.extend(nodes.points.iter().map(|p| rotate(*p, angle)));
+            let turn = (TAU * sector as f64 / teeth as f64).sin_cos();
+            all_nodes.extend(nodes.points.iter().map(|p| rotate(*p, turn)));
             for element in &template {
                 elements.push(
                     element

@@ -27,12 +27,12 @@ impl Symmetric {
     }
 
     /// Adds the stiffness of an element, packed, whose displacements each follow unknowns here, by weights.
-    pub(crate) fn add_following(&mut self, stiffness: &[f64], follows: &[impl AsRef<[(usize, f64)]>]) {
+    pub(crate) fn add_following(&mut self, stiffness: &[f64], follows: &[Vec<(usize, f64)>]) {
         for (i, row) in follows.iter().enumerate() {
             for (j, column) in follows.iter().enumerate() {
                 let value = stiffness[packed_index(i, j)];
-                for (a, weight) in row.as_ref() {
-                    for (b, other) in column.as_ref() {
+                for (a, weight) in row {
+                    for (b, other) in column {
                         self.add(*a, *b, value * weight * other);
                     }
                 }

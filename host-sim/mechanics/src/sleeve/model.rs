@@ -136,25 +136,6 @@ impl Flexspline3d {
         around * self.rim.radius_mm * self.rim.radius_mm / 1e3
     }
 
-    /// Torque over turn of the rim where the torque comes in through teeth at two lobes, each bearing evenly over
-    /// `half_angle_rad` to either side of the major axis and turning by its mean, N·m/rad; the generator lets no part
-    /// of the band move in or out.
-    ///
-    /// The load is `T/(2 pi R) (1 + 2 sum s_n cos n theta)`, n = 2, 4 …, `s_n = sin(n h)/(n h)`; each harmonic is a
-    /// spring in series, `1/K = 1/K_0 + sum s_n²/(R² k_n)`, k_n the stiffness of V. Zero where nothing holds the rim.
-    pub fn torsion_at_lobes_n_m_per_rad(&self, half_angle_rad: f64) -> f64 {
-        let radius_mm = self.rim.radius_mm;
-        let evenly = self.torsion_n_m_per_rad().recip();
-        let waves = (2..=HIGHEST).step_by(2).map(|n| {
-            let reach = f64::from(n) * half_angle_rad;
-            let share = if reach == 0.0 { 1.0 } else { reach.sin() / reach };
-            // In W, tilt, V and slope of V: W stands, tilt and slope are free.
-            let around = self.at(n).band_and_turn().condensed(&[2], &[0]).at(0, 0);
-            1e3 * share * share / (radius_mm * radius_mm * around)
-        });
-        (evenly + waves.sum::<f64>()).recip()
-    }
-
     /// Force over displacement of the middle of the rim, moved sideways as a body, N/mm; zero where nothing holds it.
     pub fn lateral_n_per_mm(&self) -> f64 {
         let middle = self.at(1).middle(&[W, V]);
@@ -231,40 +212,6 @@ mod tests {
             let Rollers { w45, w90 } = flexspline.two_rollers();
             assert!((w45 - rollers[0]).abs() < 0.01 && (w90 - rollers[1]).abs() < 0.01, "{name}: {w45} {w90}");
         }
-    }
-
-    /// A load spread over all of the rim is torsion as ever; the narrower the lobes, the softer. What two lobes add is
-    /// mostly the rim between them: pulled around by `cos n theta` it stretches as a ring that cannot move in or out,
-    /// `pi E b t n²/R`, a tenth softer at most where it bulges beside the band.
-    #[test]
-    fn torque_at_two_lobes_turns_the_rim_further_than_torque_all_around() {
-        let cup = cup();
-        let around = cup.torsion_n_m_per_rad();
-        let [even, wide, narrow] =
-            [0.5 * std::f64::consts::PI, 0.35, 0.1].map(|half| cup.torsion_at_lobes_n_m_per_rad(half));
-        assert!((even / around - 1.0).abs() < 1e-9, "{even} {around}");
-        assert!(narrow < wide && wide < around, "{narrow} {wide} {around}");
-        let ring = smooth(&["sleeve.kind=none"]);
-        let rim = &ring.rim;
-        let stretched = |n: u32| {
-            let area = ring.width_mm * rim.thickness_mm;
-            std::f64::consts::PI * rim.youngs_modulus_mpa * area * f64::from(n * n) / rim.radius_mm
-        };
-        for n in [2, 4] {
-            let found = ring.at(n).band_and_turn().condensed(&[2], &[0]).at(0, 0);
-            assert!((0.9..1.05).contains(&(found / stretched(n))), "n {n}: {found} {}", stretched(n));
-        }
-        // The tube of a cup stretches with its rim.
-        let by_ring: f64 = (2..=HIGHEST)
-            .step_by(2)
-            .map(|n| {
-                let reach = 0.35 * f64::from(n);
-                1e3 * (reach.sin() / reach / rim.radius_mm).powi(2) / stretched(n)
-            })
-            .sum();
-        let added = (wide.recip() - around.recip()) / by_ring;
-        assert!((0.3..1.1).contains(&added), "{added} of the ring's");
-        assert!(ring.torsion_at_lobes_n_m_per_rad(0.35) < 1e-3);
     }
 
     #[test]

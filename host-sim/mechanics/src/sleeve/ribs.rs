@@ -15,8 +15,8 @@ impl Ribs {
     /// The teeth of a drive on its rim.
     ///
     /// Along the axis a tooth is a straight rib of its own cross-section: it carries its area, and its second moment
-    /// about the common centroid, beside the wall's. Around the axis the toothed rim bends like a smooth one that is
-    /// stiffer; by how much is asked of plane FEM of one tooth pitch in pure bending.
+    /// about the common centroid, in addition to the wall's. Around the axis the toothed rim bends like a smooth one
+    /// that is stiffer; by how much is asked of plane FEM of one tooth pitch in pure bending.
     pub fn of_teeth(drive: &Drive) -> Result<Ribs, MeshError> {
         let wheel = &drive.flexspline;
         let wall = wheel.rim_thickness_mm;
@@ -52,9 +52,35 @@ fn tooth_moments(drive: &Drive) -> Result<[f64; 3], DriveError> {
     Ok(moments)
 }
 
+/// Adds the small-strain stiffness of sector 0 of a mesh. The nodes on its far face move as those on the near one,
+/// turned by a pitch, and by the unknowns and weights that `beyond` gives for a node of the far face in each direction.
+pub(super) fn add_sector(
+    to: &mut Symmetric,
+    mesh: &WheelMesh,
+    material: &PlaneStrain,
+    beyond: impl Fn([f64; 2]) -> [Vec<(usize, f64)>; 2],
+) {
+    let own = mesh.nodes_per_sector;
+    let [along, across] = [[1.0, 0.0], [0.0, 1.0]].map(|axis| rotate(axis, mesh.pitch().sin_cos()));
+    for (element, points) in mesh.elements.iter().zip(&mesh.gauss).take(mesh.elements_per_sector) {
+        // Each displacement of a node by the unknowns that it follows.
+        let follows = |&node: &u32| {
+            let node = node as usize;
+            if node < own {
+                return [vec![(2 * node, 1.0)], vec![(2 * node + 1, 1.0)]];
+            }
+            let near = 2 * (node - own);
+            let more = beyond(mesh.nodes[node]);
+            [0, 1].map(|k| [&[(near, along[k]), (near + 1, across[k])], more[k].as_slice()].concat())
+        };
+        let follows: Vec<Vec<(usize, f64)>> = element.iter().flat_map(follows).collect();
+        to.add_following(&linear_stiffness(points, material), &follows);
+    }
+}
+
 /// Bending stiffness of the toothed rim around the axis, relative to that of the smooth one.
 ///
-/// One sector of the mesh; its far face moves as the near one, turned by a pitch, and beside that as a rigid body: by a
+/// One sector of the mesh; its far face moves as the near one, turned by a pitch, and in addition as a rigid body: by a
 /// translation that is free and a rotation, whose stiffness is asked for.
 fn bending_around(drive: &Drive) -> Result<f64, MeshError> {
     let plain = Drive { as_built: Default::default(), ..drive.clone() };
@@ -62,29 +88,8 @@ fn bending_around(drive: &Drive) -> Result<f64, MeshError> {
     let material = PlaneStrain::new(drive.material.youngs_modulus_mpa, drive.material.poissons_ratio);
     let own = mesh.nodes_per_sector;
     let rigid = 2 * own;
-    let turn = mesh.pitch().sin_cos();
     let mut matrix = Symmetric::zeros(rigid + 3);
-    for (element, points) in mesh.elements.iter().zip(&mesh.gauss).take(mesh.elements_per_sector) {
-        let stiffness = linear_stiffness(points, &material);
-        // Each displacement of a node by the unknowns that it follows.
-        let follows: Vec<Vec<(usize, f64)>> = element
-            .iter()
-            .flat_map(|&node| {
-                let node = node as usize;
-                if node < own {
-                    return [vec![(2 * node, 1.0)], vec![(2 * node + 1, 1.0)]];
-                }
-                let near = 2 * (node - own);
-                let [x, y] = mesh.nodes[node];
-                let (along, across) = (rotate([1.0, 0.0], turn), rotate([0.0, 1.0], turn));
-                [0, 1].map(|k| {
-                    let lever = [-y, x][k];
-                    vec![(near, along[k]), (near + 1, across[k]), (rigid + k, 1.0), (rigid + 2, lever)]
-                })
-            })
-            .collect();
-        matrix.add_following(&stiffness, &follows);
-    }
+    add_sector(&mut matrix, &mesh, &material, |[x, y]| [0, 1].map(|k| vec![(rigid + k, 1.0), (rigid + 2, [-y, x][k])]));
     let rotation = matrix.condensed(&[rigid + 2], &[]).at(0, 0);
     let (wall, radius) = (drive.flexspline.rim_thickness_mm, drive.flexspline.neutral_radius_mm());
     let smooth = drive.material.plane_strain_modulus_mpa() * wall.powi(3) / 12.0;

@@ -1,10 +1,10 @@
 //! How far a single slice of a pair of teeth gives way beyond the rest of its face: what levels a load along the face.
 
 use super::matrix::Symmetric;
+use super::ribs::add_sector;
 use crate::drive::{Drive, Side};
-use crate::fem::element::linear_stiffness;
 use crate::fem::material::PlaneStrain;
-use crate::mesh::{MeshError, MeshLevel, WheelMesh, rotate};
+use crate::mesh::{MeshError, MeshLevel, WheelMesh};
 
 /// Normal approach of a pair of flanks by the deformation of the two wheels, for 1 N per mm of face width: mm²/N.
 ///
@@ -29,25 +29,8 @@ const EDGE_MM: f64 = 1e-6;
 /// Work of a uniform pressure on the plus flank of every tooth, 1 N/mm in all on each.
 fn tooth_compliance(mesh: &WheelMesh, material: &PlaneStrain, held: impl Fn(f64) -> bool) -> f64 {
     let own = mesh.nodes_per_sector;
-    let turn = mesh.pitch().sin_cos();
     let mut matrix = Symmetric::zeros(2 * own);
-    for (element, points) in mesh.elements.iter().zip(&mesh.gauss).take(mesh.elements_per_sector) {
-        let stiffness = linear_stiffness(points, material);
-        // The far face of the sector moves as the near one, turned by a pitch.
-        let follows: Vec<[(usize, f64); 2]> = element
-            .iter()
-            .flat_map(|&node| {
-                let node = node as usize;
-                if node < own {
-                    return [[(2 * node, 1.0), (2 * node + 1, 0.0)], [(2 * node, 0.0), (2 * node + 1, 1.0)]];
-                }
-                let near = 2 * (node - own);
-                let (along, across) = (rotate([1.0, 0.0], turn), rotate([0.0, 1.0], turn));
-                [0, 1].map(|k| [(near, along[k]), (near + 1, across[k])])
-            })
-            .collect();
-        matrix.add_following(&stiffness, &follows);
-    }
+    add_sector(&mut matrix, mesh, material, |_| [const { Vec::new() }; 2]);
     let holds = |n: usize| held(mesh.nodes[n][0].hypot(mesh.nodes[n][1]));
     let fixed: Vec<usize> = (0..own).filter(|n| holds(*n)).flat_map(|n| [2 * n, 2 * n + 1]).collect();
     matrix.work_of(&flank_load(mesh), &fixed)

@@ -14,6 +14,7 @@ use std::rc::Rc;
 
 use crate::contact::{AlongFace, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
 use crate::fem::{Border, BorderedSystem};
+use crate::mesh::rotate;
 
 use super::continuation::{
     ContactStage, Continuation, DEFORMING_SOFTNESS, JUMPING_SOFTNESS, LOADING_SOFTNESS, Sought, Way,
@@ -630,7 +631,7 @@ impl<'p> Solver<'p> {
     ///
     /// With `chord` the last tangent serves again.
     fn solve(&mut self, residual: &Unbalance, chord: bool) -> Option<NewtonStep> {
-        // What the forces do without the border, where it was solved with a new factor's own.
+        // Displacements by the forces without the border, solved together with the border of a new factor.
         let mut begun = None;
         if !chord || self.eliminated.is_none() {
             self.eliminated = None;
@@ -680,9 +681,8 @@ impl<'p> Solver<'p> {
     fn turn(&self, free: &mut [f64], border: &mut [f64; BORDERS], pitches: isize) {
         if pitches != 0 {
             self.wheels.turn(free, pitches);
-            let (sin, cos) = (pitches as f64 * self.problem.flexspline.pitch()).sin_cos();
-            let [x, y] = [border[LATERAL], border[LATERAL + 1]];
-            (border[LATERAL], border[LATERAL + 1]) = (cos * x - sin * y, sin * x + cos * y);
+            let turn = (pitches as f64 * self.problem.flexspline.pitch()).sin_cos();
+            [border[LATERAL], border[LATERAL + 1]] = rotate([border[LATERAL], border[LATERAL + 1]], turn);
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use crate::mesh::rotate;
+
 use super::predictor::turn_field;
 use super::problem::Problem;
 use super::state::State;
@@ -69,68 +71,63 @@ impl Passed {
         let nominal = 1.0 / problem.drive.ratio();
         let pitch = problem.flexspline.pitch();
         let steady = !reversing && (from.output_rate / nominal - 1.0).abs() < 0.2 && self.go_on(from, torque_n_m);
-        let (fs, cs) = problem.wheels();
-        if steady {
-            // What was passed in the first pitch may not have settled yet.
-            let settled = |state: &State| (state.generator_rad - self.since).abs() > pitch;
-            let passed: Vec<&State> = self.states.iter().filter(|state| settled(state)).collect();
-            let pitches = |state: &State| (generator_rad - state.generator_rad) / pitch;
-            let weights = phase_weights(&passed.iter().map(|state| pitches(state)).collect::<Vec<_>>());
-            let own = (pitches(from) - pitches(from).round()).abs();
-            if let Some(weights) = weights.filter(|w| w.nearest < 0.5 * own) {
-                let mut predicted = State {
-                    u: vec![0.0; from.u.len()],
-                    v: vec![0.0; from.v.len()],
-                    output_rad: 0.0,
-                    sleeve_moment: 0.0,
-                    lateral_force: [0.0; 2],
-                    generator_rad,
-                    torque_n_m,
-                    ..from.clone()
-                };
-                for (k, weight) in weights.states {
-                    let state = passed[k];
-                    let turn = generator_rad - state.generator_rad;
-                    let add = |sum: &mut [f64], part: &[f64]| {
-                        sum.iter_mut().zip(part).for_each(|(x, p)| *x += weight * p);
-                    };
-                    add(&mut predicted.u, &turn_field(fs, &state.u, turn));
-                    add(&mut predicted.v, &turn_field(cs, &state.v, turn - turn * nominal));
-                    predicted.output_rad += weight * (state.output_rad + turn * nominal);
-                    predicted.sleeve_moment += weight * state.sleeve_moment;
-                    let (sin, cos) = turn.sin_cos();
-                    let [x, y] = state.lateral_force;
-                    add(&mut predicted.lateral_force, &[cos * x - sin * y, sin * x + cos * y]);
-                }
-                return predicted;
-            }
-        }
         let off = |state: &State| {
             let pitches = (generator_rad - state.generator_rad) / pitch;
             (pitches - pitches.round()).abs()
         };
+        if steady {
+            // States of the first pitch may not have settled yet.
+            let settled = |state: &State| (state.generator_rad - self.since).abs() > pitch;
+            let passed: Vec<&State> = self.states.iter().filter(|state| settled(state)).collect();
+            let pitches = |state: &&State| (generator_rad - state.generator_rad) / pitch;
+            let weights = phase_weights(&passed.iter().map(pitches).collect::<Vec<_>>());
+            if let Some(weights) = weights.filter(|w| w.nearest < 0.5 * off(from)) {
+                let states: Vec<(&State, f64)> = weights.states.iter().map(|(k, w)| (passed[*k], *w)).collect();
+                return turned_on(problem, from, &states, generator_rad, torque_n_m, |turn| turn * nominal);
+            }
+        }
         let nearest = self.states.iter().filter(|_| steady).min_by(|a, b| off(a).total_cmp(&off(b)));
         let base = nearest.filter(|state| off(state) < 0.5 * off(from)).unwrap_or(from);
-        let turn = generator_rad - base.generator_rad;
-        let output_turn = match (idle, reversing) {
+        let output_turn = |turn: f64| match (idle, reversing) {
             (true, true) => 0.0,
             (false, true) => turn * nominal,
             _ if std::ptr::eq(base, from) => from.output_rate * turn,
             _ => turn * nominal,
         };
-        let (sin, cos) = turn.sin_cos();
-        let [x, y] = base.lateral_force;
-        State {
-            u: turn_field(fs, &base.u, turn),
-            v: turn_field(cs, &base.v, turn - output_turn),
-            output_rad: base.output_rad + output_turn,
-            sleeve_moment: base.sleeve_moment,
-            lateral_force: [cos * x - sin * y, sin * x + cos * y],
-            generator_rad,
-            torque_n_m,
-            ..from.clone()
-        }
+        turned_on(problem, from, &[(base, 1.0)], generator_rad, torque_n_m, output_turn)
     }
+}
+
+/// The weighted sum of states, each with its wave turned to a generator angle and its output by `output_turn` of that.
+fn turned_on(
+    problem: &Problem,
+    from: &State,
+    states: &[(&State, f64)],
+    generator_rad: f64,
+    torque_n_m: f64,
+    output_turn: impl Fn(f64) -> f64,
+) -> State {
+    let (fs, cs) = problem.wheels();
+    let mut predicted = State {
+        u: vec![0.0; from.u.len()],
+        v: vec![0.0; from.v.len()],
+        output_rad: 0.0,
+        sleeve_moment: 0.0,
+        lateral_force: [0.0; 2],
+        generator_rad,
+        torque_n_m,
+        ..from.clone()
+    };
+    for (state, weight) in states {
+        let turn = generator_rad - state.generator_rad;
+        let add = |sum: &mut [f64], part: &[f64]| sum.iter_mut().zip(part).for_each(|(x, p)| *x += weight * p);
+        add(&mut predicted.u, &turn_field(fs, &state.u, turn));
+        add(&mut predicted.v, &turn_field(cs, &state.v, turn - output_turn(turn)));
+        predicted.output_rad += weight * (state.output_rad + output_turn(turn));
+        predicted.sleeve_moment += weight * state.sleeve_moment;
+        add(&mut predicted.lateral_force, &rotate(state.lateral_force, turn.sin_cos()));
+    }
+    predicted
 }
 
 /// States and their weights, and how far (pitches) the nearest of them is.

@@ -4,7 +4,7 @@
 //! a periodic function of the sector alone. Turning the wave by a fraction of a pitch is interpolation of that
 //! function.
 
-use crate::mesh::WheelMesh;
+use crate::mesh::{WheelMesh, rotate};
 
 /// Displacements of a wheel with the wave turned by `angle_rad` relative to the wheel.
 pub(crate) fn turn_field(mesh: &WheelMesh, field: &[f64], angle_rad: f64) -> Vec<f64> {
@@ -16,7 +16,6 @@ pub(crate) fn turn_field(mesh: &WheelMesh, field: &[f64], angle_rad: f64) -> Vec
     let turns: Vec<(f64, f64)> = (0..mesh.teeth).map(|j| mesh.sector_angle(j).sin_cos()).collect();
     let mut turned = vec![0.0; field.len()];
     for sector in 0..mesh.teeth {
-        let (sin, cos) = turns[sector];
         // Value at sector - shift, from six sectors around it.
         let sources: [usize; 6] =
             std::array::from_fn(|i| (sector as isize - whole as isize - 1 + 3 - i as isize).rem_euclid(teeth) as usize);
@@ -25,12 +24,12 @@ pub(crate) fn turn_field(mesh: &WheelMesh, field: &[f64], angle_rad: f64) -> Vec
             for (source, weight) in sources.iter().zip(&weights) {
                 let (s, c) = turns[*source];
                 let n = 2 * (source * per_sector + k);
-                local[0] += weight * (c * field[n] + s * field[n + 1]);
-                local[1] += weight * (c * field[n + 1] - s * field[n]);
+                let [x, y] = rotate([field[n], field[n + 1]], (-s, c));
+                local[0] += weight * x;
+                local[1] += weight * y;
             }
             let n = 2 * (sector * per_sector + k);
-            turned[n] = cos * local[0] - sin * local[1];
-            turned[n + 1] = sin * local[0] + cos * local[1];
+            [turned[n], turned[n + 1]] = rotate(local, turns[sector]);
         }
     }
     turned

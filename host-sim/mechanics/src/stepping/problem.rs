@@ -9,7 +9,7 @@ use crate::drive::{
     ActiveFlank, Drive, FaceLoad, FlankDeviations, GeneratorKind, GeneratorOutline, RimVariation, Side, ToothFlank,
 };
 use crate::fem::material::PlaneStrain;
-use crate::mesh::{MeshLevel, WheelMesh};
+use crate::mesh::{MeshLevel, WheelMesh, rotate};
 use crate::sleeve::pair_compliance;
 use crate::suggest::UnknownName;
 
@@ -100,9 +100,7 @@ impl SolverSettings {
             GeneratorKind::DoubleDisc | GeneratorKind::Cam => 1e6,
         })
     }
-}
 
-impl SolverSettings {
     /// Integration points in each bore edge for a generator.
     pub fn bore_points(&self, kind: GeneratorKind) -> usize {
         self.bore_points.unwrap_or(match kind {
@@ -305,7 +303,7 @@ impl Problem {
         state.leans = leans;
     }
 
-    /// The waves of the rim that shells beside it hold, in a state: harmonic, and amplitude a (mm) of `cos n theta` and
+    /// The waves of the rim that adjoining shells hold, in a state: harmonic, and amplitude a (mm) of `cos n theta` and
     /// of `sin n theta`.
     pub fn rim_waves(&self, state: &State) -> Vec<(u32, [f64; 2])> {
         let pairs = self.third.additions.iter().zip(self.waves.chunks_exact(2));
@@ -357,7 +355,7 @@ impl Problem {
     /// space.
     pub(super) fn check_range(&self, state: &State) -> Result<(), SolveError> {
         let (mesh, _) = self.wheels();
-        // As built, some root of a space may stand further in, and the tooth and the axis beside their places.
+        // As built, some root of a space may stand further in, and tooth and axis off their places.
         let further_in = self.deviations.spaces.iter().map(|space| -space.translation[0]).fold(0.0, f64::max);
         let root = self.drive.circular_spline.root_radius_mm - further_in;
         let axis = self.deviations.axis;
@@ -366,10 +364,9 @@ impl Problem {
                 let Some(&tip) = flank.nodes.last() else { continue };
                 let n = mesh.node(tooth as isize, tip);
                 let x = mesh.nodes[n];
-                let [dx, dy] = self.deviations.teeth[tooth].translation;
-                let (s, c) = mesh.sector_angle(tooth).sin_cos();
-                let beside = [c * dx - s * dy - axis[0], s * dx + c * dy - axis[1]];
-                let radius = (x[0] + state.u[2 * n] + beside[0]).hypot(x[1] + state.u[2 * n + 1] + beside[1]);
+                let offset = rotate(self.deviations.teeth[tooth].translation, mesh.sector_angle(tooth).sin_cos());
+                let [dx, dy] = [offset[0] - axis[0], offset[1] - axis[1]];
+                let radius = (x[0] + state.u[2 * n] + dx).hypot(x[1] + state.u[2 * n + 1] + dy);
                 if radius > root {
                     return Err(SolveError::OutOfRange {
                         generator_rad: state.generator_rad,
@@ -448,14 +445,14 @@ impl Problem {
         let scale = self.drive.thermal_state.flexspline_scale;
         let neutral_radius = neutral.radius_mm() * scale;
         // The rim follows its generator sideways.
-        let [cx, cy] = self.outline.centre();
+        let turn = generator_rad.sin_cos();
+        let [cx, cy] = rotate(self.outline.centre(), turn);
         let mut u = Vec::with_capacity(2 * fs.nodes.len());
         for x in &fs.nodes {
             let (r, phi) = (x[0].hypot(x[1]), x[1].atan2(x[0]));
             let (p, normal) = neutral.position(phi - generator_rad);
-            let (s, c) = generator_rad.sin_cos();
-            let p =
-                [scale * (c * p[0] - s * p[1]) + (c * cx - s * cy), scale * (s * p[0] + c * p[1]) + (s * cx + c * cy)];
+            let [x1, y1] = rotate(p, turn);
+            let p = [scale * x1 + cx, scale * y1 + cy];
             let (sn, cn) = (normal + generator_rad).sin_cos();
             let above = r - neutral_radius;
             u.extend([p[0] + above * cn - x[0], p[1] + above * sn - x[1]]);

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::fem::element::{PACKED, add_tangent_and_force, linear_stiffness};
 use crate::fem::{BlockPosition, Cholesky, ElementPositions, Factor, Pattern};
+use crate::mesh::rotate;
 
 use super::newton::ANCHOR;
 use super::problem::Problem;
@@ -158,20 +159,20 @@ impl Wheels for SparseWheels<'_> {
         }
         let cs = &problem.circular_spline;
         for (e, element) in cs.elements.iter().enumerate() {
-            let (sin, cos) = cs.sector_angle(e / cs.elements_per_sector).sin_cos();
+            let turn @ (sin, cos) = cs.sector_angle(e / cs.elements_per_sector).sin_cos();
             let stiffness = &self.cs_template[e % cs.elements_per_sector];
             let mut local = [0.0; 16];
             for (a, &n) in element.iter().enumerate() {
-                let (x, y) = (state.v[2 * n as usize], state.v[2 * n as usize + 1]);
-                local[2 * a] = cos * x + sin * y;
-                local[2 * a + 1] = cos * y - sin * x;
+                let d = [state.v[2 * n as usize], state.v[2 * n as usize + 1]];
+                [local[2 * a], local[2 * a + 1]] = rotate(d, (-sin, cos));
             }
             let nodal = packed_times(stiffness, &local);
             for (a, &n) in element.iter().enumerate() {
                 if let Some(free) = self.cs_index[n as usize] {
                     let k = 2 * free as usize;
-                    force[k] -= cos * nodal[2 * a] - sin * nodal[2 * a + 1];
-                    force[k + 1] -= sin * nodal[2 * a] + cos * nodal[2 * a + 1];
+                    let [x, y] = rotate([nodal[2 * a], nodal[2 * a + 1]], turn);
+                    force[k] -= x;
+                    force[k + 1] -= y;
                 }
             }
         }
@@ -189,11 +190,7 @@ impl Wheels for SparseWheels<'_> {
             values[yy] += contact.stiffness[row_y + 2 * a + 1];
             for b in 0..a {
                 let p = bore_positions[contact.edge][a * (a - 1) / 2 + b].expect("bore nodes share an element");
-                let (base, row, column) = (p.base as usize, p.row as usize, p.column as usize);
-                values[base] += contact.stiffness[row_x + 2 * b];
-                values[base + column] += contact.stiffness[row_x + 2 * b + 1];
-                values[base + row] += contact.stiffness[row_y + 2 * b];
-                values[base + row + column] += contact.stiffness[row_y + 2 * b + 1];
+                p.add(|i, j| contact.stiffness[[row_x, row_y][i] + 2 * b + j], values);
             }
         }
     }
@@ -209,12 +206,7 @@ impl Wheels for SparseWheels<'_> {
             values[yy] += contact.stiffness[(2 * a + 1) * n + 2 * a + 1];
         }
         for &(a, b, p) in &positions.blocks {
-            for i in 0..2 {
-                for j in 0..2 {
-                    let position = p.base as usize + i * p.row as usize + j * p.column as usize;
-                    values[position] += contact.stiffness[(2 * a + i) * n + 2 * b + j];
-                }
-            }
+            p.add(|i, j| contact.stiffness[(2 * a + i) * n + 2 * b + j], values);
         }
     }
 

@@ -1,8 +1,8 @@
 //! Signatures of geometric causes from the influence kernels of the contact FEM ([`flexspline_design::kernels`]), where
 //! the drive has them: what each load and each place in the wave makes of an error is then computed, not assumed.
 //!
-//! Errors that the kernels leave open stay nuisances: the kernels are those of the frictionless drive at one temperature
-//! and on one mesh.
+//! Errors that the kernels leave open stay nuisances: the kernels are those of the frictionless drive at one
+//! temperature and on one mesh.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
