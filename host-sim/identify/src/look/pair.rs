@@ -40,12 +40,14 @@ struct PairRank {
 }
 
 /// Why a pair goes before another: neither is a command; names say a shaft (2) or an angle (1) of each; both are of one
-/// joint (2), that is open (1), or their numbers differ; the generator turns on.
-const WHY: [&str; 5] = [
+/// joint (2), that is open (1), or their numbers differ; the generator turns on; neither is computed from the other.
+const WHY: [&str; 7] = [
     "they are measured, no command",
     "their names say so",
     "they are of one joint by their numbers",
     "they turn on, and do not swing about zero",
+    "the others are one column times a number to the last digit, as what is computed is",
+    "they have one unit",
     "they make the straighter line, which need not say much",
 ];
 
@@ -187,6 +189,8 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
                     named(g) + named(o),
                     joints.map_or(1, |_| 2 * u8::from(!two_joints)),
                     u8::from(turns_on(g)),
+                    u8::from(!is_computed(g, o, &line)),
+                    u8::from(g.unit == o.unit),
                 ],
                 straight: -line.left,
             };
@@ -210,4 +214,10 @@ fn turns_on(guess: &Guess) -> bool {
     let way: f64 = some.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
     let swings = (0.5 * (least + most)).abs() < ABOUT_ZERO * range && way > OFTEN * range;
     far && !swings
+}
+
+/// Whether one column is the other times a number, to the last digit that the file has.
+fn is_computed(generator: &Guess, output: &Guess, line: &Slope) -> bool {
+    let range = output.facts.most - output.facts.least;
+    line.left * range <= output.facts.step.max(line.slope.abs() * generator.facts.step)
 }

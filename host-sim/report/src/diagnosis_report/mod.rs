@@ -736,7 +736,7 @@ mod tests {
             let stamps: Vec<Status> = [faulty.status].into_iter().chain(faulty.also).collect();
             assert!(stamps.contains(&Status::DataFaults) && !stamps.contains(&Status::Good), "{stamps:?}");
             assert_eq!(stamps.contains(&status), status != Status::Good);
-            assert!(faulty.remarks[0].contains("encoder index jump; the output jumps."), "{:?}", faulty.remarks);
+            assert!(faulty.remarks[1].contains("encoder index jump; the output jumps."), "{:?}", faulty.remarks);
         }
         // What a joint would feel comes first where it was evaluated.
         let mut evaluated = diagnosis(Verdict::Explained, &[CauseName::Wear]);
