@@ -4,9 +4,11 @@
 //! [`Extended::fit_to`] learns from some of the sessions alone, so that what it says of the others was not seen by it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use flexspline::Table;
 
+use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
 use super::candidate::{Acting, Excitation, Law, LawUnits, Regressor, Tag, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
@@ -209,7 +211,8 @@ impl Extended {
         if averages_hide(&on, &laws, causes, &uncertain, stride) {
             stride = 1;
         }
-        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth);
+        let averaged = Averaged::of(&on, stride).map(Arc::new);
+        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth, averaged);
         let start = match Thinned::of(&on, stride) {
             Some(thinned) => {
                 let sample = Sample::new(&on, &thinned, &uncertain, stride);

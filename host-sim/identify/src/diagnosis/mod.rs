@@ -14,6 +14,7 @@
 //!
 //! Every decision on the way is in the `trace`; `explain` says from it why a cause was named or not.
 
+mod averaged;
 pub mod base;
 pub(crate) mod candidate;
 pub(crate) mod channels;
@@ -47,6 +48,7 @@ mod with_speed;
 mod zeros;
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use flexspline::Table;
 use thiserror::Error;
@@ -54,6 +56,7 @@ use thiserror::Error;
 use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
+use averaged::Averaged;
 use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
 pub use explain::Explanation;
 pub(crate) use extended::nominal_arcsec;
@@ -256,10 +259,11 @@ impl<'a> Search<'a> {
         let mut uncertain = prepare::uncertain(on, &[], &hung);
         let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
         let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
-        let mut free = FreeColumns::of(on, &laws);
+        let mut averaged = Averaged::of(on, stride).map(Arc::new);
+        let mut free = FreeColumns::of(on, &laws, averaged.clone());
         let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
         say_noise(&trace, noise, worth);
-        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
+        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         let mut fast: Vec<(Label, f64)> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut bests = Bests::default();
@@ -318,10 +322,11 @@ impl<'a> Search<'a> {
             let closer_look = finer.stride < stride;
             stride = stride.min(finer.stride);
             if closer_look {
+                averaged = Averaged::of(on, stride).map(Arc::new);
                 thinned = Thinned::of(on, stride);
             }
-            if !free.are_of(&laws) {
-                free = FreeColumns::of(on, &laws);
+            if closer_look || !free.are_of(&laws) {
+                free = FreeColumns::of(on, &laws, averaged.clone());
             }
             explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
             let (again, worth_again) = {
@@ -337,7 +342,7 @@ impl<'a> Search<'a> {
             }
             (noise, worth) = (again, worth_again);
             say_noise(&trace, noise, worth);
-            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
+            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         }
         Ok(Search { laws, problem, noise, stride, thinned, start, bests, fast, trace })
     }

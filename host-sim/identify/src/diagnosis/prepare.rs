@@ -1,11 +1,13 @@
 //! What has to be known before causes are compared: how noisy the data are, and where they jump.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use flexspline::Table;
 use rayon::prelude::*;
 
 use super::LEAST_ROWS;
+use super::averaged::{Averaged, Grain};
 use super::base::{Base, Floating, NEAR_FRICTION, few};
 use super::candidate::{Excitation, Law, Regressor, Tolerance};
 use super::model::{Problem, Term};
@@ -299,12 +301,15 @@ pub(crate) struct FreeColumns {
 }
 
 impl FreeColumns {
-    /// Main columns of laws, at some places of their shape parameters.
+    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on `averaged`, if
+    /// there is any.
     #[must_use]
-    pub fn of(on: &Excitation<'_>, laws: &[Law]) -> FreeColumns {
-        let stride = on.rows.count_used().div_ceil(WANDER_AVERAGES).max(1);
+    pub fn of(on: &Excitation<'_>, laws: &[Law], averaged: Option<Arc<Averaged>>) -> FreeColumns {
+        let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride);
+        let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
         let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
-        let (columns, priors) = free_columns(on, laws, &plain).into_iter().unzip();
+        let grain = Grain::new(averaged, &plain);
+        let (columns, priors) = free_columns(on, laws, &plain, &grain).into_iter().unzip();
         FreeColumns { stride, laws: laws.len(), columns, priors }
     }
 
@@ -426,17 +431,18 @@ fn nearest(hypotheses: &[Noise], noise: Noise) -> usize {
 }
 
 /// Columns of what floats and of all laws at some places, averaged, with wide priors.
-fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener) -> Vec<(Vec<f64>, Prior)> {
+fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Grain) -> Vec<(Vec<f64>, Prior)> {
     let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
     let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
         let tried = law.tried();
         let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
-        let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(on, &law.values(places)));
+        let on = grain.excitation(law.smooth(), on);
+        let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
         let counts =
             |column: &Regressor| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
         all.filter(counts)
             .map(|column| {
-                let averaged = plain.average(&column.values);
+                let averaged = grain.average(law.smooth(), plain, &column.values);
                 let std = 20.0 / rms(&averaged).max(1e-9);
                 (averaged, Prior { mean: 0.0, std })
             })

@@ -859,7 +859,7 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
         found = Some(
             super::prepare::noise(
                 on,
-                &super::FreeColumns::of(on, &laws),
+                &super::FreeColumns::of(on, &laws, None),
                 &[],
                 &super::prepare::uncertain(on, &[], &[]),
                 None,

@@ -3,6 +3,9 @@
 //! The sample is made of stretches of neighbouring rows, so that tooth mesh, play and ringing are in it as they are in
 //! the rows. One stretch is taken out of every few, at a place that no period of the drive follows.
 
+use std::sync::Arc;
+
+use super::averaged::Averaged;
 use super::base::{Base, Floating};
 use super::candidate::Excitation;
 use super::model::Problem;
@@ -69,21 +72,23 @@ pub(crate) struct Sample<'a> {
     on: Excitation<'a>,
     uncertain: Vec<bool>,
     stride: usize,
+    averaged: Option<Arc<Averaged>>,
 }
 
 impl<'a> Sample<'a> {
-    /// The sample where these of all rows are uncertain.
+    /// The sample where these of all rows are uncertain, averaged as it was made for.
     #[must_use]
     pub fn new(on: &Excitation<'a>, thinned: &'a Thinned, uncertain: &[bool], stride: usize) -> Sample<'a> {
         let on = on.over(&thinned.rows, &thinned.base);
-        Sample { on, uncertain: thinned.kept.iter().map(|k| uncertain[*k]).collect(), stride }
+        let averaged = Averaged::of(&on, stride).map(Arc::new);
+        Sample { on, uncertain: thinned.kept.iter().map(|k| uncertain[*k]).collect(), stride, averaged }
     }
 
     /// The sample under this noise.
     #[must_use]
     pub fn problem(&self, noise: Noise, worth: f64) -> Problem<'_> {
         let whitener = Whitener::new(self.on.rows, &self.uncertain, self.stride, noise);
-        Problem::new(&self.on, &self.uncertain, whitener, worth)
+        Problem::new(&self.on, &self.uncertain, whitener, worth, self.averaged.clone())
     }
 }
 

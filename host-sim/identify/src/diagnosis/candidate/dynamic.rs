@@ -100,6 +100,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
             vec![(Name::TorqueNM, torque_n_m), (Name::PhaseRad, shape.of(Name::PhaseRad))]
         })
         .physical_if(move |shape, _| shape.of(Name::TorqueNM) > least * scale)
+        .evaluated_on_averages()
         .adds_load(move |on, shape| load(on, of(shape)))
         .led_by(
             move |on, _| {

@@ -118,6 +118,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| history(held, 1.0)));
         columns
     })
+    .evaluated_on_averages()
     .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
     .parameters_by(move |_, shape, c| {
         vec![(Name::HalfWidthArcsec, half_width(load, shape, c)), (Name::SlipTorqueNM, shape.of(Name::SlipTorqueNM))]
@@ -149,6 +150,7 @@ fn stiffness_hardening() -> Law {
             nuisance(power(exponent + 1.5), 0.3),
         ]
     })
+    .evaluated_on_averages()
     .shapes([Shape::evenly(Name::Exponent, 1.6, 4.4, 3)])
     .parameters_by(|on, shape, c| {
         vec![
@@ -273,6 +275,7 @@ fn wear(by: WearsWith) -> Law {
     })
     .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
     .well_known()
+    .evaluated_on_averages()
 }
 
 /// Growth of the clearance between two sessions.
@@ -306,7 +309,8 @@ fn wear_between_sessions(on: &Excitation<'_>) -> Option<Law> {
         growth > 0.0 && c.all(STEP).all(|step| step > -NOT_NARROWER * growth)
     })
     .well_known()
-    .variant("between sessions");
+    .variant("between sessions")
+    .evaluated_on_averages();
     Some(law)
 }
 
