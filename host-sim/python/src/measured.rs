@@ -197,7 +197,8 @@ pub fn diagnose<'py>(
         });
         let series = done.extended.predict(&done.recording.sessions, &subject.nominal, subject.table.as_ref());
         let rows = Rows::of(&done.recording.sessions, &series);
-        Ok((json, made.drive_toml, made.table, explanation.transpose()?, rows))
+        let best = made.tables.into_iter().next().map(|(_, table)| table);
+        Ok((json, made.drive_toml, best, explanation.transpose()?, rows))
     })?;
     let (json, drive_toml, table, explanation, rows) = done;
     let table = table.map(|table| parts(py, &table)).transpose()?;

@@ -187,7 +187,7 @@ impl Diagnose {
 
     /// Writes the extended drive and table, as far as they were made.
     fn write(&self, context: &Context, made: &mut Made, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
-        if let Some(table) = &mut made.table {
+        for (_, table) in &mut made.tables {
             table.info.command.clone_from(&context.command);
         }
         let toml = made.drive_toml.as_ref().map(|toml| (header(context) + toml).into_bytes());

@@ -377,7 +377,11 @@ pub fn diagnose_rows(
     progress(4, 5, "compensation by the core");
     let table_subject = subject.table_subject();
     let measured = subject.as_measured(&recording)?;
-    let known_table = subject.known_table(std::slice::from_ref(&recording))?;
+    // A model whose causes make no table predicts all the same.
+    let known_table = subject.known_table(std::slice::from_ref(&recording)).unwrap_or_else(|error| {
+        recording.notes.push(format!("the causes known before make no table: {error}"));
+        None
+    });
     let known = known_table.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PipelineError::Image)?;
     let tables = tables_of(subject, &table_subject, std::slice::from_ref(&recording));
     let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
@@ -457,25 +461,26 @@ pub struct Made {
     pub extension: Extension,
     /// `drive-extended.toml`; none where no cause was found.
     pub drive_toml: Option<String>,
-    /// The table.
-    pub table: Option<MadeTable>,
+    /// Tables with the names of their files, the one that leaves least first: the extended table wherever it gains, the
+    /// calibrated one where it leaves less.
+    pub tables: Vec<(String, MadeTable)>,
 }
 
 impl Made {
-    /// The files of the table with their contents; the image first.
+    /// The files of the tables with their contents; of each the image first.
     #[must_use]
     pub fn table_files(&self) -> Vec<(String, Vec<u8>)> {
-        let (Some(made), Some(file)) = (&self.table, &self.extension.table.file) else { return Vec::new() };
-        let info = serde_json::to_vec_pretty(&made.info).unwrap_or_default();
-        let stem = file.trim_end_matches(".fxt");
-        [
-            ("fxt", made.image.clone()),
-            ("json", info),
-            ("rs", rust_source(made).into_bytes()),
-            ("h", c_header(made).into_bytes()),
-        ]
-        .map(|(ending, content)| (format!("{stem}.{ending}"), content))
-        .into()
+        let files = |(stem, made): &(String, MadeTable)| {
+            let info = serde_json::to_vec_pretty(&made.info).unwrap_or_default();
+            [
+                ("fxt", made.image.clone()),
+                ("json", info),
+                ("rs", rust_source(made).into_bytes()),
+                ("h", c_header(made).into_bytes()),
+            ]
+            .map(|(ending, content)| (format!("{stem}.{ending}"), content))
+        };
+        self.tables.iter().flat_map(files).collect()
     }
 }
 
@@ -527,39 +532,45 @@ impl Diagnosed {
             let found = self.geometry(subject, &tables, options, by_fem, &mut extension)?;
             extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
             extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
-            if let (Some(make), Some((TableKind::Extended, _))) = (options.remake, gain.first()) {
+            if let Some(make) = options.remake.filter(|_| gain.iter().any(|(kind, _)| *kind == TableKind::Extended)) {
                 by_drive = remade(make, subject, &found, options.mesh).map_err(PipelineError::Remake)?;
                 extension.tables_by_fem = by_drive.is_some();
             }
             drive_toml = Some(found.drive.to_toml() + &causes_to_toml(&found.rest));
         }
-        let (mut table, mut why) = (None, evaluation.words());
+        let (mut made_tables, mut why) = (Vec::new(), evaluation.words());
         for (kind, rms_left_out_arcsec) in gain {
-            let (stem, made) = match (kind, by_drive.take()) {
-                (TableKind::Extended, Some(made)) => (format!("{}-extended", subject.kind), Ok(made)),
-                (TableKind::Extended, None) => (format!("{}-extended", subject.kind), tables.extended(&self.extended)),
-                _ => ("calibrated".to_owned(), self.calibrated(subject, &tables)),
+            let is_calibrated = kind != TableKind::Extended;
+            if is_calibrated && !made_tables.is_empty() {
+                continue;
+            }
+            let (stem, made) = match by_drive.take_if(|_| !is_calibrated) {
+                Some(made) => (format!("{}-extended", subject.kind), Ok(made)),
+                None if is_calibrated => ("calibrated".to_owned(), self.calibrated(subject, &tables)),
+                None => (format!("{}-extended", subject.kind), tables.extended(&self.extended)),
             };
-            let file = Some(format!("{stem}.fxt"));
-            extension.table = WrittenTable { kind, file, rms_left_out_arcsec, why: String::new() };
             match made {
-                Ok(made) => table = Some(made),
+                Ok(made) => {
+                    if made_tables.is_empty() {
+                        let file = Some(format!("{stem}.fxt"));
+                        extension.table = WrittenTable { kind, file, rms_left_out_arcsec, why: String::new() };
+                    }
+                    made_tables.push((stem, made));
+                }
                 Err(error) => why += &format!("; {error}"),
             }
-            if table.is_some() {
-                break;
-            }
         }
-        if table.is_none() {
+        if made_tables.is_empty() {
             let least = evaluation.left.rms_uncompensated_arcsec.min(evaluation.left.rms_nominal_tables_arcsec);
             extension.table = WrittenTable { rms_left_out_arcsec: least, ..WrittenTable::default() };
         }
         extension.table.why = why;
-        if extension.table.kind != TableKind::Extended && !self.diagnosis.causes.is_empty() {
+        let extended = made_tables.iter().any(|(stem, _)| stem.ends_with("-extended"));
+        if !extended && !self.diagnosis.causes.is_empty() {
             extension.tables_not_written = Some(extension.table.text());
         }
-        extension.table_id = table.as_ref().map(|made| made.info.table_id.clone());
-        Ok(Made { extension, drive_toml, table })
+        extension.table_id = made_tables.first().map(|(_, made)| made.info.table_id.clone());
+        Ok(Made { extension, drive_toml, tables: made_tables })
     }
 
     /// The table of a calibration of the same rows, less what a cause of the output's encoder adds.
