@@ -539,38 +539,37 @@ impl Diagnosed {
             drive_toml = Some(found.drive.to_toml() + &causes_to_toml(&found.rest));
         }
         let (mut made_tables, mut why) = (Vec::new(), evaluation.words());
-        for (kind, rms_left_out_arcsec) in gain {
-            let is_calibrated = kind != TableKind::Extended;
-            if is_calibrated && !made_tables.is_empty() {
-                continue;
-            }
-            let (stem, made) = match by_drive.take_if(|_| !is_calibrated) {
-                Some(made) => (format!("{}-extended", subject.kind), Ok(made)),
-                None if is_calibrated => ("calibrated".to_owned(), self.calibrated(subject, &tables)),
-                None => (format!("{}-extended", subject.kind), tables.extended(&self.extended)),
+        for (kind, left) in gain {
+            let made = match kind {
+                TableKind::Extended => by_drive.take().map_or_else(|| tables.extended(&self.extended), Ok),
+                _ if made_tables.is_empty() => self.calibrated(subject, &tables),
+                _ => continue,
             };
             match made {
-                Ok(made) => {
-                    if made_tables.is_empty() {
-                        let file = Some(format!("{stem}.fxt"));
-                        extension.table = WrittenTable { kind, file, rms_left_out_arcsec, why: String::new() };
-                    }
-                    made_tables.push((stem, made));
-                }
+                Ok(made) => made_tables.push((kind, left, made)),
                 Err(error) => why += &format!("; {error}"),
             }
         }
-        if made_tables.is_empty() {
-            let least = evaluation.left.rms_uncompensated_arcsec.min(evaluation.left.rms_nominal_tables_arcsec);
-            extension.table = WrittenTable { rms_left_out_arcsec: least, ..WrittenTable::default() };
-        }
-        extension.table.why = why;
-        let extended = made_tables.iter().any(|(stem, _)| stem.ends_with("-extended"));
+        let stem = |kind: TableKind| match kind {
+            TableKind::Extended => format!("{}-extended", subject.kind),
+            _ => "calibrated".to_owned(),
+        };
+        extension.table = match made_tables.first() {
+            Some(&(kind, rms_left_out_arcsec, _)) => {
+                WrittenTable { kind, file: Some(format!("{}.fxt", stem(kind))), rms_left_out_arcsec, why }
+            }
+            None => {
+                let least = evaluation.left.rms_uncompensated_arcsec.min(evaluation.left.rms_nominal_tables_arcsec);
+                WrittenTable { rms_left_out_arcsec: least, why, ..WrittenTable::default() }
+            }
+        };
+        let extended = made_tables.iter().any(|(kind, ..)| *kind == TableKind::Extended);
         if !extended && !self.diagnosis.causes.is_empty() {
             extension.tables_not_written = Some(extension.table.text());
         }
-        extension.table_id = made_tables.first().map(|(_, made)| made.info.table_id.clone());
-        Ok(Made { extension, drive_toml, tables: made_tables })
+        extension.table_id = made_tables.first().map(|(.., made)| made.info.table_id.clone());
+        let tables = made_tables.into_iter().map(|(kind, _, made)| (stem(kind), made)).collect();
+        Ok(Made { extension, drive_toml, tables })
     }
 
     /// The table of a calibration of the same rows, less what a cause of the output's encoder adds.
