@@ -64,9 +64,9 @@
 //! ```
 //! [`Encoder`] converts the counts of an encoder into an angle, and back: any counts in a turn, registers that begin
 //! anew, no drift; that of the generator is read by [`Joint::read`], with which a wrong bit moves no turn. In a slow
-//! rate group ([`RateGroup`]) the firmware sets the temperature ([`Store::set_temperature`]) and lets a few words of
-//! the images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers:
-//! [`Table::forward`], [`Table::inverse`].
+//! rate group, such as every hundredth tick, the firmware sets the temperature ([`Store::set_temperature`]) and lets a
+//! few words of the images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone
+//! answers: [`Table::forward`], [`Table::inverse`].
 //!
 //! # Beside the table
 //! Motion of the drive beyond its table goes into the [`Adjustment`] of the next tick, from whatever knows of it.
@@ -136,7 +136,7 @@
 //! ```
 //! use flexspline::*;
 //!
-//! let mut recorder = Recorder::new(Ring::<64>::new(), RateGroup::new(100, 0).ok_or("rate group")?);
+//! let mut recorder = Recorder::new(Ring::<64>::new(), core::num::NonZeroU32::new(100).ok_or("every")?);
 //! let mut watch = Watch::new();
 //! let mut after_tick = |tick, state: &JointState, store: &Store, output: &Output| {
 //!     recorder.record(tick, state, store, output);
@@ -244,15 +244,13 @@ pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use encoder::{Encoder, EncoderError, EncoderSettings, EncoderState, EncoderWrap};
 pub use error::{DriveError, Field, ImageError};
-#[cfg(any(test, feature = "std"))]
-pub use joint::JOINT_STATE_WORDS;
 pub use joint::{
     AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead,
-    Coefficient, Disturbance, FittedSlip, Flags, Implausible, Inertias, Input, Joint, JointState, Learning, Limits,
-    LoadTorque, Measured, Mode, ModeError, MotionAhead, Noise, NominalOutput, Now, Output, OutputAhead, Overrun,
-    PREDICTOR_PARTS, Predictor, PredictorError, PredictorState, RateGroup, Readings, RestoreError, SAVED_JOINT_BYTES,
-    Seen, SettingError, Slip, SlipBank, SlipElement, SlipState, SlipVariable, StartUp, StartUpSettings, StartUpStep,
-    Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
+    Coefficient, Disturbance, Flags, Implausible, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque,
+    Measured, Mode, ModeError, MotionAhead, Noise, NominalOutput, Now, Output, OutputAhead, Overrun, PREDICTOR_PARTS,
+    Predictor, PredictorError, PredictorState, Readings, RestoreError, SAVED_JOINT_BYTES, Seen, SettingError, Slip,
+    SlipBank, SlipElement, SlipState, SlipVariable, StartUp, StartUpSettings, StartUpStep, Term, TorquePath,
+    TorqueReading, TorqueSettings, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
 pub use self_test::{SelfTestError, self_test};

@@ -191,5 +191,5 @@ pub extern "C" fn flexspline_rad_between(from_counts: i64, to_counts: i64) -> f3
 /// too where `divisor` is 0 or `offset` not below it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_is_due(tick: u32, divisor: u32, offset: u32) -> u8 {
-    RateGroup::new(divisor, offset).is_some_and(|group| group.is_due(tick)) as u8
+    crate::telemetry::is_due(tick, divisor, offset) as u8
 }

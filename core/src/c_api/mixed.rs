@@ -138,7 +138,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     assert_eq!(flexspline_slip_init(&mut c_torque_slip, kind, TORQUE_SPRINGS.as_ptr(), 2), Done);
     assert_eq!(flexspline_predictor_of(&mut c_predictor, &INERTIAS, &NOISE, 1e-3), Done);
     assert_eq!(flexspline_observer_init(&mut c_observer), Done);
-    assert_eq!(flexspline_recorder_init(&mut c_recorder, 8, 10, 3, FLEXSPLINE_FULL_LOSE_OLDEST), Done);
+    assert_eq!(flexspline_recorder_init(&mut c_recorder, 8, 10, 0, FLEXSPLINE_FULL_LOSE_OLDEST), Done);
     let mut c_records = [FlexsplineRecord::default(); 8];
     // And from Rust.
     let (encoder, adapter, predictor, (bank, torque_bank)) = (encoder(), adapter(), predictor(), banks());
@@ -155,7 +155,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     let (mut aged, mut learnt, mut observer) = (Aged::new(4), adapter.start(), PredictorState::new());
     learnt.set_learning(Learning::On);
     let (mut springs, mut torque_springs) = (SlipState::<3>::unknown(), SlipState::<2, LoadTorque>::unknown());
-    let mut recorder = Recorder::new(Ring::<8>::new(), RateGroup::new(10, 3).unwrap());
+    let mut recorder = Recorder::new(Ring::<8>::new(), core::num::NonZeroU32::new(10).unwrap());
 
     let start = encoder.reading(1 << 30);
     assert_eq!(flexspline_encoder_start(&mut c_encoder, start, 0), Done);

@@ -67,7 +67,8 @@ pub struct FlexsplineRecord {
 /// Which places of a list are filled, and how many records there were.
 #[derive(Clone, Copy)]
 struct KeptRing {
-    group: RateGroup,
+    divisor: u32,
+    offset: u32,
     places: u16,
     first: u16,
     filled: u16,
@@ -178,16 +179,16 @@ pub extern "C" fn flexspline_recorder_init(
     full: u8,
 ) -> FlexsplineStatus {
     let make = || {
-        let group = RateGroup::new(divisor, offset).ok_or(FlexsplineStatus::Argument)?;
         let lose_new = match full {
             FLEXSPLINE_FULL_LOSE_OLDEST => false,
             FLEXSPLINE_FULL_LOSE_NEW => true,
             _ => return Err(FlexsplineStatus::Argument),
         };
-        if places == 0 {
+        if places == 0 || offset >= divisor {
             return Err(FlexsplineStatus::Argument);
         }
-        put(recorder, RECORDER_MARK, KeptRing { group, places, first: 0, filled: 0, number: 0, lost: 0, lose_new })
+        let ring = KeptRing { divisor, offset, places, first: 0, filled: 0, number: 0, lost: 0, lose_new };
+        put(recorder, RECORDER_MARK, ring)
     };
     status(make())
 }
@@ -213,7 +214,7 @@ pub extern "C" fn flexspline_recorder_see(
         clear(list, [span(recorder), span(state), span(store), span(output)])?;
         let state: &JointState = get(state, STATE_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
-        if at_once == 0 && !kept.group.is_due(tick) {
+        if at_once == 0 && !is_due(tick, kept.divisor, kept.offset) {
             return Ok(());
         }
         let (number, lost) = (kept.number, kept.lost);

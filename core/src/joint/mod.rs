@@ -8,7 +8,6 @@ mod learning;
 mod limits;
 mod mode;
 mod predictor;
-mod rate_group;
 mod runtime;
 mod signals;
 mod slip;
@@ -32,11 +31,10 @@ pub use predictor::{
     Ahead, Disturbance, Inertias, Measured, Noise, Now, OutputAhead, PREDICTOR_PARTS, Predictor, PredictorError,
     PredictorState,
 };
-pub use rate_group::RateGroup;
 pub use runtime::Joint;
 pub use signals::{Flags, Input, Output};
 pub use slip::{
-    FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
+    LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
 #[cfg(any(test, feature = "c-api"))]

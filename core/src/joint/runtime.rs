@@ -4,7 +4,7 @@
 //! follows the generator (forward); the target is turned into a correction (inverse); mode and overrun policy say how
 //! much of it is wanted; a limiter moves the correction there; settings, state and what is known of the table are
 //! checked. What slower rate groups do is called by the firmware after [`Joint::tick`], in an order that is fixed in
-//! its source ([`RateGroup`](crate::RateGroup)).
+//! its source.
 //!
 //! | what happens | what the joint does | flag |
 //! |---|---|---|

@@ -118,19 +118,6 @@ pub struct Slip {
     pub uncertainty_rad: f32,
 }
 
-/// A bank that was found from samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FittedSlip<const N: usize, V = NominalOutput> {
-    /// The bank.
-    pub bank: SlipBank<N, V>,
-    /// Constant offset of the samples, rad.
-    pub offset_rad: f64,
-    /// Residual of the samples, rad: root of the mean square.
-    pub rms_rad: f64,
-    /// Samples used: those at which every deflection was known.
-    pub used: usize,
-}
-
 impl Slip {
     /// The error in counts, within ±[`Adjustment::MAX_COUNTS`]: to be added to the mean of an [`Adjustment`].
     #[must_use]
@@ -163,21 +150,6 @@ impl<const N: usize> SlipBank<N, NominalOutput> {
     pub fn update(&self, state: &mut SlipState<N>, nominal: OutputAngle) -> Slip {
         self.follow(state, Some(nominal.counts()))
     }
-
-    /// Gains at given widths from samples of error, rad, at nominal outputs along a path, in its order: a curve of
-    /// first loading from [`SlipState::relaxed`], or loops from [`SlipState::unknown`], of which that part is used
-    /// where every deflection is known.
-    ///
-    /// Non-negative least squares with a free offset. For the host. `None` if a width is not allowed or no sample is of
-    /// use.
-    pub fn fit(
-        widths_rad: [f32; N],
-        start: SlipState<N>,
-        samples: impl IntoIterator<Item = (OutputAngle, f64)>,
-    ) -> Option<FittedSlip<N>> {
-        let unit = Self::new(widths_rad.map(|width_rad| SlipElement { width_rad, gain: 0.0 }))?;
-        unit.fitted(start, samples.into_iter().map(|(at, error)| (at.counts(), error)))
-    }
 }
 
 impl<const N: usize> SlipBank<N, LoadTorque> {
@@ -198,16 +170,6 @@ impl<const N: usize> SlipBank<N, LoadTorque> {
     /// moves nothing. The same work for all values.
     pub fn update(&self, state: &mut SlipState<N, LoadTorque>, torque_n_m: f32) -> Slip {
         self.follow(state, torque_counts(torque_n_m))
-    }
-
-    /// As [`SlipBank::fit`], at torques in N·m; samples at a torque that is not finite are left out.
-    pub fn fit_torque(
-        widths_n_m: [f32; N],
-        start: SlipState<N, LoadTorque>,
-        samples: impl IntoIterator<Item = (f32, f64)>,
-    ) -> Option<FittedSlip<N, LoadTorque>> {
-        let unit = Self::of_torque(widths_n_m.map(|width_n_m| TorqueSlipElement { width_n_m, gain_rad_per_n_m: 0.0 }))?;
-        unit.fitted(start, samples.into_iter().filter_map(|(torque, error)| Some((torque_counts(torque)?, error))))
     }
 }
 
@@ -417,87 +379,6 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         let state = SlipState { deflections: Sealed::new(state), variable: PhantomData };
         if possible { Ok(state) } else { Err(RestoreError::Impossible) }
     }
-
-    /// Gains of these widths by non-negative least squares, one coordinate after another.
-    #[allow(clippy::arithmetic_side_effects)] // Floating-point numbers.
-    fn fitted(self, state: SlipState<N, V>, samples: impl Iterator<Item = (i64, f64)>) -> Option<FittedSlip<N, V>> {
-        let (springs, mut state) = (self.springs.open()?, state.deflections.open()?);
-        let (mut gram, mut toward, mut sums) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
-        let (mut errors, mut squares, mut used) = (0.0, 0.0, 0usize);
-        for (at, error) in samples {
-            springs.follow(&mut state, at);
-            if state.lower != state.upper || !error.is_finite() {
-                continue;
-            }
-            // In parts of the width: all alike.
-            let mut parts = state.lower.map(f64::from);
-            parts.iter_mut().zip(springs.widths).for_each(|(z, width)| *z /= f64::from(width.max(1)));
-            for ((row, toward), (sum, z)) in gram.iter_mut().zip(&mut toward).zip(sums.iter_mut().zip(parts)) {
-                row.iter_mut().zip(parts).for_each(|(cell, other)| *cell += z * other);
-                *toward += z * error;
-                *sum += z;
-            }
-            (errors, squares, used) = (errors + error, squares + error * error, used.saturating_add(1));
-        }
-        if used == 0 {
-            return None;
-        }
-        // About the means: the offset is free.
-        let number = used as f64;
-        for ((row, toward), sum) in gram.iter_mut().zip(&mut toward).zip(sums) {
-            row.iter_mut().zip(sums).for_each(|(cell, other)| *cell -= sum * other / number);
-            *toward -= sum * errors / number;
-        }
-        let mut gains = [0.0f64; N];
-        for _ in 0..FIT_SWEEPS {
-            for (i, (row, toward)) in gram.iter().zip(toward).enumerate() {
-                let own = row.get(i).copied().unwrap_or(0.0);
-                let rest = toward - row.iter().zip(gains).map(|(cell, gain)| cell * gain).sum::<f64>();
-                if let Some(gain) = gains.get_mut(i).filter(|_| own > 1e-9 * number) {
-                    *gain = (*gain + rest / own).max(0.0);
-                }
-            }
-        }
-        let of_parts = |values: [f64; N]| values.iter().zip(gains).map(|(value, gain)| value * gain).sum::<f64>();
-        let offset_rad = (errors - of_parts(sums)) / number;
-        let mut left = squares - errors * errors / number - 2.0 * of_parts(toward);
-        for (row, gain) in gram.iter().zip(gains) {
-            left += gain * of_parts(*row);
-        }
-        let mut per_count = springs.widths.map(|width| 1.0 / f64::from(width.max(1)));
-        per_count.iter_mut().zip(gains).for_each(|(per_count, gain)| *per_count *= gain);
-        let bank = Self::of(springs.widths, per_count.map(|gain| gain as f32), N);
-        Some(FittedSlip { bank, offset_rad, rms_rad: libm::sqrt((left / number).max(0.0)), used })
-    }
-}
-
-/// Sweeps over all gains in a fit.
-const FIT_SWEEPS: u32 = 20_000;
-
-impl<const N: usize> SlipBank<N, NominalOutput> {
-    /// The springs.
-    #[must_use]
-    pub fn elements(&self) -> [SlipElement; N] {
-        let mut elements = [SlipElement::default(); N];
-        let Springs { widths, gains, .. } = self.springs.open().unwrap_or(*self.springs.kept());
-        for (to, (width, gain)) in elements.iter_mut().zip(widths.iter().zip(gains)) {
-            *to = SlipElement { width_rad: *width as f32 * RAD_PER_COUNT, gain: gain * COUNTS_PER_RAD };
-        }
-        elements
-    }
-}
-
-impl<const N: usize> SlipBank<N, LoadTorque> {
-    /// The springs.
-    #[must_use]
-    pub fn elements(&self) -> [TorqueSlipElement; N] {
-        let mut elements = [TorqueSlipElement::default(); N];
-        let Springs { widths, gains, .. } = self.springs.open().unwrap_or(*self.springs.kept());
-        for (to, (width, gain)) in elements.iter_mut().zip(widths.iter().zip(gains)) {
-            *to = TorqueSlipElement { width_n_m: *width as f32 / PER_N_M, gain_rad_per_n_m: gain * PER_N_M };
-        }
-        elements
-    }
 }
 
 impl<const N: usize, V> Default for SlipState<N, V> {
@@ -551,6 +432,7 @@ crate::upset::upsets!([const N: usize] Deflections<N> { at, started, lower, uppe
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::angle::COUNTS_PER_RAD;
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -658,43 +540,8 @@ mod tests {
         let added = slip.added_to(adjustment);
         assert_eq!(added, Adjustment { mean_counts: 100 + slip.mean_counts(), half_width_counts: 7 });
         assert!((slip.mean_counts() as f64 - slipping * COUNTS_PER_RAD as f64).abs() < 1.0);
-        let full = Adjustment { mean_counts: i32::MAX, half_width_counts: 0 };
-        assert_eq!(slip.added_to(full).mean_counts, Adjustment::MAX_COUNTS);
-    }
-
-    /// From the curve of first loading, and from loops whose start is not known.
-    #[test]
-    fn gains_are_found_from_samples() {
-        let truth = torque_bank();
-        let widths = [1.0, 2.0, 5.0, 10.0];
-        let expected = [0.0, 4e-6, 0.0, 1.5e-6];
-        let loops = (0..4000).map(|i| 30.0 * (i as f32 * 0.01).sin() * (1.0 - i as f32 / 8000.0));
-        let loading = (0..400).map(|i| i as f32 * 0.05);
-        let mut state = SlipState::relaxed();
-        let curve: Vec<_> = loading.map(|t| (t, 3e-5 + truth.update(&mut state, t).error_rad as f64)).collect();
-        let mut state = SlipState::relaxed();
-        let looped: Vec<_> = loops
-            .map(|t| (t, 3e-5 + truth.update(&mut state, t).error_rad as f64 + 1e-7 * (1e3 * t as f64).sin()))
-            .collect();
-        for (start, samples, limit) in [(SlipState::relaxed(), curve, 1e-9), (SlipState::unknown(), looped, 5e-8)] {
-            let found = SlipBank::fit_torque(widths, start, samples.iter().copied().chain([(f32::NAN, 0.0)])).unwrap();
-            for (element, expected) in found.bank.elements().into_iter().zip(expected) {
-                assert!((element.gain_rad_per_n_m as f64 - expected).abs() < limit, "{found:?}");
-            }
-            assert!((found.offset_rad - 3e-5).abs() < 20.0 * limit && found.rms_rad < 1e-7, "{found:?}");
-            assert!(found.used > 300 && found.used <= samples.len());
-        }
-        // A spring that never slips in the samples is not distinguishable from a slope; no samples say nothing.
-        assert_eq!(SlipBank::fit_torque([1.0], SlipState::unknown(), [(0.0, 1e-5), (0.5, 1e-5)]), None);
-        assert_eq!(SlipBank::fit([f32::NAN], SlipState::relaxed(), []), None);
-        let mut state = SlipState::relaxed();
-        let path: Vec<_> =
-            (0..3000).map(|i| OutputAngle::from_counts((6e5 * (i as f64 * 0.01).sin()) as i64)).collect();
-        let samples = path.iter().map(|&at| (at, bank().update(&mut state, at).error_rad as f64));
-        let found = SlipBank::fit(bank().elements().map(|e| e.width_rad), SlipState::unknown(), samples).unwrap();
-        for (found, exact) in found.bank.elements().iter().zip(bank().elements()) {
-            assert!((found.gain - exact.gain).abs() < 1e-4 * exact.gain);
-        }
+        let full = Adjustment::new(i32::MAX, 0);
+        assert_eq!(slip.added_to(full).mean_counts(), Adjustment::MAX_COUNTS);
     }
 
     proptest! {

@@ -191,22 +191,6 @@ impl TorquePath {
         Ok(path.sealed())
     }
 
-    /// Values that change from tick to tick, for a simulation that goes on from here.
-    #[cfg(any(test, feature = "std"))]
-    #[must_use]
-    pub const fn kept(&self) -> [u32; 7] {
-        let PathState { behind, believed, doubted, settle, frozen, gap, marks, .. } = *self.path.kept();
-        [behind, believed, doubted, upper(settle), upper(frozen), gap, marks]
-    }
-
-    /// Goes on from what [`Self::kept`] gave.
-    #[cfg(any(test, feature = "std"))]
-    pub const fn go_on(&mut self, [behind, believed, doubted, since, same, gap, marks]: [u32; 7]) {
-        let path = *self.path.kept();
-        let (settle, frozen) = (halves(path.settle & FLAGS, since), halves(path.frozen & FLAGS, same));
-        *self = PathState { behind, believed, doubted, settle, frozen, gap, marks, ..path }.sealed();
-    }
-
     /// Whether an upset hit more of it than can be mended: make it anew.
     #[must_use]
     pub fn is_damaged(&self) -> bool {

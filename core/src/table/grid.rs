@@ -56,13 +56,6 @@ impl Cell {
         let (first, last) = (s.wrapping_mul(s) >> 16, t.wrapping_mul(t) >> 16);
         [first as i32, 0x8000u32.wrapping_sub(first).wrapping_sub(last) as i32, last as i32]
     }
-
-    /// How the slope weighs the two steps between the three coefficients, in 2⁻¹⁵.
-    #[must_use]
-    pub const fn slope_weights_q15(self) -> [i32; 2] {
-        let t = self.fraction >> 17;
-        [0x8000u32.wrapping_sub(t) as i32, t as i32]
-    }
 }
 
 /// Nodes spread evenly over one period.
@@ -308,7 +301,6 @@ mod tests {
             }
             prop_assert!(cell.weights().iter().all(|&w| (0.0..=0.75).contains(&w)), "{:?}", cell);
             prop_assert!((cell.weights().iter().sum::<f32>() - 1.0).abs() < 3e-7);
-            prop_assert_eq!(cell.slope_weights_q15().iter().sum::<i32>(), 32_768);
             prop_assert!(axis.around(cell).iter().all(|&i| i < n));
         }
 

@@ -6,4 +6,6 @@ mod events;
 mod records;
 
 pub use events::{Event, Events, Watch};
+#[cfg(any(test, feature = "c-api"))]
+pub(crate) use records::is_due;
 pub use records::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};

@@ -1,7 +1,7 @@
 //! Ticks of a joint, as records of fixed size: into a bounded queue in the tick, out of it and to the ground when there
 //! is time.
 //!
-//! [`Recorder::record`] is called each tick and keeps every n-th ([`RateGroup`]). It never waits. Where a record goes,
+//! [`Recorder::record`] is called each tick and keeps every n-th. It never waits. Where a record goes,
 //! and what happens when there is no room, is a type:
 //!
 //! | sink | where reader and writer are | when full |
@@ -39,10 +39,11 @@
 
 use crate::angle::OutputAngle;
 use crate::crc::crc32;
-use crate::joint::{Flags, JointState, Mode, Output, RateGroup};
+use crate::joint::{Flags, JointState, Mode, Output};
 use crate::store::{Counters, Health, Store};
 use crate::table::Quality;
 use core::fmt;
+use core::num::NonZeroU32;
 
 /// Size of a record as bytes.
 pub const RECORD_BYTES: usize = 52;
@@ -371,25 +372,30 @@ impl<const N: usize> Reader<'_, N> {
     }
 }
 
+/// Whether tick number `tick` is one of every `divisor`-th from `offset` on; of none where there can be none.
+pub(crate) fn is_due(tick: u32, divisor: u32, offset: u32) -> bool {
+    tick.checked_rem(divisor) == Some(offset)
+}
+
 /// Records every n-th tick.
 #[derive(Debug)]
 pub struct Recorder<S> {
     sink: S,
-    group: RateGroup,
+    every: NonZeroU32,
     number: u16,
     lost: u32,
 }
 
 impl<S: Sink> Recorder<S> {
-    /// Records the ticks of `group`.
+    /// Records the ticks whose number is a multiple of `every`.
     #[must_use]
-    pub const fn new(sink: S, group: RateGroup) -> Self {
-        Self { sink, group, number: 0, lost: 0 }
+    pub const fn new(sink: S, every: NonZeroU32) -> Self {
+        Self { sink, every, number: 0, lost: 0 }
     }
 
     /// One tick, after [`Joint::tick`](crate::Joint::tick): recorded if it is due. True if a record was lost.
     pub fn record(&mut self, tick: u32, state: &JointState, store: &Store, output: &Output) -> bool {
-        self.group.is_due(tick) && self.record_now(tick, state, store, output)
+        is_due(tick, self.every.get(), 0) && self.record_now(tick, state, store, output)
     }
 
     /// Records a tick whether due or not: something happened.
@@ -434,7 +440,7 @@ mod tests {
     }
 
     fn filled<S: Sink>(sink: S, ticks: u32, divisor: u32) -> Recorder<S> {
-        let mut recorder = Recorder::new(sink, RateGroup::new(divisor, 0).unwrap());
+        let mut recorder = Recorder::new(sink, NonZeroU32::new(divisor).unwrap());
         let (state, store) = (JointState::new(), Store::new());
         for tick in 0..ticks {
             recorder.record(tick, &state, &store, &output(tick as f32));

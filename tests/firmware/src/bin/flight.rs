@@ -8,9 +8,7 @@
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
-use flexspline::{
-    Disturbance, Images, JointState, Measured, Mode, PlayState, Predictor, PredictorState, RateGroup, Store,
-};
+use flexspline::{Disturbance, Images, JointState, Measured, Mode, PlayState, Predictor, PredictorState, Store};
 use flexspline_firmware::trajectory::{JOINT, Trajectory};
 use flexspline_firmware::{PREDICTOR, TABLES, finish};
 
@@ -42,7 +40,6 @@ fn main() -> ! {
     let Some(predictor) = predictor() else { finish(false) };
     let mut inertias = PredictorState::new();
     let mut trajectory = Trajectory::new(1);
-    let slow = RateGroup::new(100, 50);
     let mut held_back = 0u32;
     for tick in 0..TICKS {
         let out = black_box(JOINT.tick(&images, store, &mut state, &trajectory.input()));
@@ -50,7 +47,7 @@ fn main() -> ! {
         let measured = Measured { torque_n_m: 12.0, speed_rad_s: 0.01, twist_rad: out.transmission_error_rad };
         predictor.step(&mut inertias, black_box(&measured));
         held_back = held_back.wrapping_add((out.held_back_rad != 0.0) as u32);
-        if slow.is_some_and(|group| group.is_due(tick)) {
+        if tick % 100 == 50 {
             store.set_temperature(&images, 21.0);
             store.check_images(&images, 16);
         }

@@ -4,7 +4,7 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use flexspline::{Images, JointState, Mode, RateGroup, Store};
+use flexspline::{Images, JointState, Mode, Store};
 use flexspline_firmware::trajectory::{JOINT, Trajectory};
 use flexspline_firmware::{TABLES, finish};
 
@@ -24,7 +24,7 @@ fn main() -> ! {
     let states = cortex_m::singleton!(: [JointState; JOINTS] = [const { JointState::new() }; JOINTS]);
     let [.., (_, [first, second])] = TABLES;
     let images = Images::new(first, second);
-    let (Some(store), Some(states), Some(slow)) = (store, states, RateGroup::new(100, 50)) else { finish(false) };
+    let (Some(store), Some(states)) = (store, states) else { finish(false) };
     if store.activate(&images, JOINT.drive(), 21.0).is_err() {
         finish(false);
     }
@@ -38,7 +38,7 @@ fn main() -> ! {
             corrected += (out.correction_rad != 0.0) as usize;
         }
         // Once for all of them.
-        if slow.is_due(tick) {
+        if tick % 100 == 50 {
             store.set_temperature(&images, 21.0);
             store.check_images(&images, 16);
         }

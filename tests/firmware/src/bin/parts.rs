@@ -4,12 +4,13 @@
 #![no_main]
 
 use core::hint::black_box;
+use core::num::NonZeroU32;
 
 use cortex_m_rt::entry;
 use flexspline::{
     AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Coefficient, Identity, IdentityCheck, Images, Input,
-    Joint, JointState, Learning, Mode, Output, OutputAngle, Queue, RateGroup, Recorder, Ring, Seen, Sink, Slip,
-    SlipBank, SlipElement, SlipState, Store, Term, Watch, self_test,
+    Joint, JointState, Learning, Mode, Output, OutputAngle, Queue, Recorder, Ring, Seen, Sink, Slip, SlipBank,
+    SlipElement, SlipState, Store, Term, Watch, self_test,
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
@@ -93,10 +94,10 @@ fn run(counter: &Counter) -> Option<[Range; 6]> {
     learnt.set_learning(Learning::On);
     let bank = SlipBank::new(SPRINGS)?;
     let mut springs = SlipState::unknown();
-    let mut ring = Recorder::new(Ring::<16>::new(), RateGroup::new(1, 0)?);
+    let mut ring = Recorder::new(Ring::<16>::new(), NonZeroU32::MIN);
     let mut queue = Queue::<16>::new();
     let (writer, mut reader) = queue.split();
-    let mut records = Recorder::new(writer, RateGroup::new(1, 0)?);
+    let mut records = Recorder::new(writer, NonZeroU32::MIN);
     let (mut state, mut watch) = (JointState::new(), Watch::new());
     state.request(Mode::Tracking).ok()?;
     let (mut trajectory, mut mixed) = (Trajectory::new(1), Mixed(5));
