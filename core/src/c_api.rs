@@ -303,19 +303,12 @@ const STATE_MARK: u32 = 0x7841_5446;
 const ACTIVATION_MARK: u32 = 0x7856_5446;
 const IDENTITY_MARK: u32 = 0x7849_5446;
 
-const _: () = {
-    assert!(size_of::<Marked<Store>>() <= size_of::<FlexsplineStore>());
-    assert!(size_of::<Marked<Joint>>() <= size_of::<FlexsplineJoint>());
-    assert!(size_of::<Marked<JointState>>() <= size_of::<FlexsplineState>());
-    assert!(
-        align_of::<Marked<Store>>() <= 8 && align_of::<Marked<Joint>>() <= 8 && align_of::<Marked<JointState>>() <= 8
-    );
-    assert!(size_of::<Marked<Activation>>() <= size_of::<FlexsplineActivation>());
-    assert!(align_of::<Marked<Activation>>() <= 8);
-    assert!(size_of::<Marked<IdentityCheck>>() <= size_of::<FlexsplineIdentity>());
-    assert!(align_of::<Marked<IdentityCheck>>() <= 8);
-    assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
-};
+const _: () = assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
+
+/// Whether a value with its mark has room in an opaque object.
+const fn fits<O, T>() -> bool {
+    size_of::<Marked<T>>() <= size_of::<O>() && align_of::<Marked<T>>() <= 8
+}
 
 /// Marks in memory: any two differ in enough bits (a test counts them) that one bit of one may flip.
 const fn spread(mark: u32) -> u32 {
@@ -349,9 +342,9 @@ fn apart<const N: usize>(objects: [(usize, usize); N]) -> Result<(), FlexsplineS
 
 /// Writes a marked value into an opaque object.
 fn put<O, T>(object: *mut O, mark: u32, value: T) -> Result<(), FlexsplineStatus> {
+    const { assert!(fits::<O, T>()) };
     usable(object)?;
-    // SAFETY: not null, aligned for `O`, whose size and alignment are at least those of the value (asserted above); the
-    // caller owns it.
+    // SAFETY: not null, aligned for `O`, in which the value has room; the caller owns it.
     unsafe { object.cast::<Marked<T>>().write(Marked { mark: spread(mark), value }) };
     Ok(())
 }
@@ -468,9 +461,10 @@ fn span<T>(pointer: *const T) -> (usize, usize) {
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_init(store: *mut FlexsplineStore) -> FlexsplineStatus {
     let init = || {
+        const { assert!(fits::<FlexsplineStore, Store>()) };
         usable(store)?;
         let marked = store.cast::<Marked<Store>>();
-        // SAFETY: not null, aligned, large enough (asserted above), and the caller's. A store is made of numbers, and
+        // SAFETY: not null, aligned, large enough, and the caller's. A store is made of numbers, and
         // one without a table of zeros (a test holds that), so the reference is to a store.
         let marked = unsafe {
             marked.write_bytes(0, 1);
@@ -589,9 +583,7 @@ pub extern "C" fn flexspline_activation_step(
             Progress::Filling => FLEXSPLINE_PROGRESS_FILLING,
             Progress::Done(_) => FLEXSPLINE_PROGRESS_DONE,
         };
-        // SAFETY: not null; the caller's, apart from everything else.
-        unsafe { progress.write(code) };
-        Ok(())
+        give(progress, code)
     };
     status(step())
 }
@@ -621,9 +613,7 @@ pub extern "C" fn flexspline_identity_step(
             Identity::Same(_) => FLEXSPLINE_IDENTITY_SAME,
             Identity::Other(_) => FLEXSPLINE_IDENTITY_OTHER,
         };
-        // SAFETY: not null; the caller's, apart from everything else.
-        unsafe { found.write(code) };
-        Ok(())
+        give(found, code)
     };
     status(step())
 }
@@ -673,7 +663,6 @@ pub extern "C" fn flexspline_store_report(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(store), span(report)])?;
-        usable(report)?;
         let store: &Store = get(store, STORE_MARK)?;
         let Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes } = store.counters();
         let (image, page) = store.damaged_page().unwrap_or((255, 0));
@@ -688,9 +677,7 @@ pub extern "C" fn flexspline_store_report(
             damaged_image: image as u8,
             damaged_page: page as u8,
         };
-        // SAFETY: not null, aligned, apart from the store; the caller's.
-        unsafe { report.write(filled) };
-        Ok(())
+        give(report, filled)
     };
     status(fill())
 }
@@ -767,16 +754,13 @@ pub extern "C" fn flexspline_state_report(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(state), span(report)])?;
-        usable(report)?;
         let state: &JointState = get(state, STATE_MARK)?;
         let filled = FlexsplineStateReport {
             missed_ticks: state.missed_ticks(),
             mode: state.mode().code() as u8,
             side_known: state.play().is_known() as u8,
         };
-        // SAFETY: not null, aligned, apart from the state; the caller's.
-        unsafe { report.write(filled) };
-        Ok(())
+        give(report, filled)
     };
     status(fill())
 }
@@ -796,10 +780,7 @@ pub extern "C" fn flexspline_state_save(
         let state: &JointState = get(state, STATE_MARK)?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
-        usable(saved)?;
-        // SAFETY: not null, apart from the state; the caller owns this length.
-        unsafe { saved.write(state.save(joint, store)) };
-        Ok(())
+        give(saved, state.save(joint, store))
     };
     status(save())
 }
@@ -878,9 +859,7 @@ pub extern "C" fn flexspline_tick(
             quality: quality_code(found.quality),
             flags: Flags::bits(found.flags),
         };
-        // SAFETY: checked above: not null, aligned, apart from what is borrowed here.
-        unsafe { output.write(given) };
-        Ok(())
+        give(output, given)
     };
     status(tick())
 }

@@ -3,15 +3,15 @@
 
 use super::names::*;
 use super::{
-    FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK, Marked,
-    STATE_MARK, STORE_MARK, apart, bytes, clear, copied, get, get_mut, give, image_status, put, span, status, usable,
+    FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STATE_MARK,
+    STORE_MARK, apart, bytes, clear, copied, get, get_mut, give, image_status, put, span, status, usable,
 };
 use crate::{
     Disturbance, Event, Flags, GeneratorAngle, Health, Inertias, Joint, JointState, Measured, Mode, Noise, Now, Output,
     OutputAngle, PREDICTOR_PARTS, Predictor, PredictorState, Quality, RECORD_BYTES, Record, Store, Upload, UploadError,
     Watch,
 };
-use core::mem::{MaybeUninit, align_of, size_of};
+use core::mem::MaybeUninit;
 
 /// Bytes of a record of telemetry.
 pub const FLEXSPLINE_RECORD_BYTES: usize = 52;
@@ -215,17 +215,7 @@ const WATCH_MARK: u32 = 0x7857_5446;
 const PREDICTOR_MARK: u32 = 0x7850_5446;
 const OBSERVER_MARK: u32 = 0x784f_5446;
 
-const _: () = {
-    assert!(size_of::<Marked<ReceptionProgress>>() <= size_of::<FlexsplineUpload>());
-    assert!(align_of::<Marked<ReceptionProgress>>() <= 8);
-    assert!(size_of::<Marked<Watch>>() <= size_of::<FlexsplineWatch>() && align_of::<Marked<Watch>>() <= 8);
-    assert!(size_of::<Marked<Predictor>>() <= size_of::<FlexsplinePredictor>() && align_of::<Marked<Predictor>>() <= 8);
-    assert!(
-        size_of::<Marked<PredictorState>>() <= size_of::<FlexsplineObserver>()
-            && align_of::<Marked<PredictorState>>() <= 8
-    );
-    assert!(FLEXSPLINE_RECORD_BYTES == RECORD_BYTES && FLEXSPLINE_PREDICTOR_PARTS == PREDICTOR_PARTS);
-};
+const _: () = assert!(FLEXSPLINE_RECORD_BYTES == RECORD_BYTES && FLEXSPLINE_PREDICTOR_PARTS == PREDICTOR_PARTS);
 
 pub(super) const fn quality_code(quality: Quality) -> u8 {
     match quality {

@@ -1,11 +1,11 @@
 //! From the register of an encoder to an angle and back; angles in other units; rate groups.
 
 use super::{
-    FlexsplineJoint, FlexsplineState, FlexsplineStatus, JOINT_MARK, Marked, STATE_MARK, apart, copied, get, get_mut,
-    give, put, span, status, usable,
+    FlexsplineJoint, FlexsplineState, FlexsplineStatus, JOINT_MARK, STATE_MARK, apart, copied, get, get_mut, give, put,
+    span, status, usable,
 };
-use crate::{Encoder, EncoderSettings, EncoderState, EncoderWrap, Joint, JointState, OutputAngle, RateGroup};
-use core::mem::{MaybeUninit, align_of, size_of};
+use crate::{Encoder, EncoderSettings, EncoderState, EncoderWrap, Joint, JointState, OutputAngle};
+use core::mem::MaybeUninit;
 
 /// Eight-byte words of a [`FlexsplineEncoder`].
 pub const FLEXSPLINE_ENCODER_WORDS: usize = 7;
@@ -41,10 +41,6 @@ struct Followed {
 }
 
 const ENCODER_MARK: u32 = 0x7845_5446;
-
-const _: () = {
-    assert!(size_of::<Marked<Followed>>() <= size_of::<FlexsplineEncoder>() && align_of::<Marked<Followed>>() <= 8);
-};
 
 /// Makes an encoder of its settings, `FLEXSPLINE_STATUS_ARGUMENT` if they cannot be; where it is is not known yet.
 #[unsafe(no_mangle)]

@@ -2,8 +2,8 @@
 
 use super::{
     FlexsplineInput, FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK,
-    Marked, STATE_MARK, STORE_MARK, apart, bytes, bytes_mut, clear, copied, core_input, get, get_mut, give, given,
-    list, put, restore_status, span, status, usable,
+    STATE_MARK, STORE_MARK, apart, bytes, bytes_mut, clear, copied, core_input, get, get_mut, give, given, list, put,
+    restore_status, span, status, usable,
 };
 use crate::joint::{NO_COEFFICIENT, NOBODY};
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     Learning, LoadTorque, OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Store, TableId, Term,
     TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
-use core::mem::{MaybeUninit, align_of, size_of};
+use core::mem::MaybeUninit;
 
 /// Largest number of coefficients of a learner.
 pub const FLEXSPLINE_LEARNER_COEFFICIENTS: usize = 7;
@@ -216,8 +216,6 @@ const LEARNER_MARK: u32 = 0x784c_5446;
 const SLIP_MARK: u32 = 0x7842_5446;
 
 const _: () = {
-    assert!(size_of::<Marked<Learner>>() <= size_of::<FlexsplineLearner>() && align_of::<Marked<Learner>>() <= 8);
-    assert!(size_of::<Marked<CSprings>>() <= size_of::<FlexsplineSlip>() && align_of::<Marked<CSprings>>() <= 8);
     assert!(FLEXSPLINE_SAVED_LEARNER_BYTES == saved_adapt_bytes(MOST));
     assert!(FLEXSPLINE_SAVED_SLIP_BYTES == saved_slip_bytes(SPRINGS));
 };
@@ -401,29 +399,19 @@ pub extern "C" fn flexspline_learner_report(
     let fill = || {
         apart([span(learner), span(report)])?;
         let learner: &Learner = get(learner, LEARNER_MARK)?;
-        let AdaptCounters {
-            used,
-            quiet,
-            outliers,
-            outliers_in_a_row,
-            unsettled,
-            unexcited,
-            untrusted,
-            limited,
-            restarts,
-        } = learner.state.counters();
+        let counters = learner.state.counters();
         give(
             report,
             FlexsplineLearnerReport {
-                used,
-                quiet,
-                outliers,
-                outliers_in_a_row,
-                unsettled,
-                unexcited,
-                untrusted,
-                limited,
-                restarts,
+                used: counters.used,
+                quiet: counters.quiet,
+                outliers: counters.outliers,
+                outliers_in_a_row: counters.outliers_in_a_row,
+                unsettled: counters.unsettled,
+                unexcited: counters.unexcited,
+                untrusted: counters.untrusted,
+                limited: counters.limited,
+                restarts: counters.restarts,
                 learning: match learner.state.learning() {
                     Learning::Off => FLEXSPLINE_LEARNING_OFF,
                     Learning::Frozen => FLEXSPLINE_LEARNING_FROZEN,
@@ -532,13 +520,22 @@ pub extern "C" fn flexspline_slip_set(slip: *mut FlexsplineSlip, is_relaxed: u8)
     status(set())
 }
 
-fn slip_report(slip: Slip, is_known: bool) -> FlexsplineSlipReport {
-    FlexsplineSlipReport {
-        error_rad: slip.error_rad,
-        uncertainty_rad: slip.uncertainty_rad,
-        mean_counts: slip.mean_counts(),
-        is_known: is_known as u8,
-    }
+/// One tick of springs: what they add, and whether every deflection is known.
+fn slip_tick(
+    slip: *mut FlexsplineSlip,
+    report: *mut FlexsplineSlipReport,
+    follow: impl FnOnce(&mut Bank) -> Result<(Slip, bool), FlexsplineStatus>,
+) -> FlexsplineStatus {
+    let tick = || {
+        apart([span(slip), span(report)])?;
+        usable(report)?;
+        let CSprings { bank, .. } = get_mut(slip, SLIP_MARK)?;
+        let (found, is_known) = follow(bank)?;
+        let Slip { error_rad, uncertainty_rad } = found;
+        let (mean_counts, is_known) = (found.mean_counts(), is_known as u8);
+        give(report, FlexsplineSlipReport { error_rad, uncertainty_rad, mean_counts, is_known })
+    };
+    status(tick())
 }
 
 /// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they
@@ -551,19 +548,14 @@ pub extern "C" fn flexspline_slip_update(
     nominal_counts: i64,
     report: *mut FlexsplineSlipReport,
 ) -> FlexsplineStatus {
-    let update = || {
-        apart([span(slip), span(report)])?;
-        usable(report)?;
-        let CSprings { bank: Bank::Output(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
-            return Err(FlexsplineStatus::Argument);
-        };
-        if !bank.mend() {
-            return Err(FlexsplineStatus::NotInitialised);
+    slip_tick(slip, report, |bank| match bank {
+        Bank::Output(bank, state) => {
+            let nominal = OutputAngle::from_counts(nominal_counts);
+            let done = bank.mend().then(|| (bank.update(state, nominal), state.is_known()));
+            done.ok_or(FlexsplineStatus::NotInitialised)
         }
-        let found = bank.update(state, OutputAngle::from_counts(nominal_counts));
-        give(report, slip_report(found, state.is_known()))
-    };
-    status(update())
+        Bank::Torque(..) => Err(FlexsplineStatus::Argument),
+    })
 }
 
 /// One tick of springs that slip with the load torque, N m: what they add in the next. A torque that is not finite
@@ -574,19 +566,13 @@ pub extern "C" fn flexspline_slip_update_torque(
     torque_n_m: f32,
     report: *mut FlexsplineSlipReport,
 ) -> FlexsplineStatus {
-    let update = || {
-        apart([span(slip), span(report)])?;
-        usable(report)?;
-        let CSprings { bank: Bank::Torque(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
-            return Err(FlexsplineStatus::Argument);
-        };
-        if !bank.mend() {
-            return Err(FlexsplineStatus::NotInitialised);
+    slip_tick(slip, report, |bank| match bank {
+        Bank::Torque(bank, state) => {
+            let done = bank.mend().then(|| (bank.update(state, torque_n_m), state.is_known()));
+            done.ok_or(FlexsplineStatus::NotInitialised)
         }
-        let found = bank.update(state, torque_n_m);
-        give(report, slip_report(found, state.is_known()))
-    };
-    status(update())
+        Bank::Output(..) => Err(FlexsplineStatus::Argument),
+    })
 }
 
 /// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most.

@@ -3,11 +3,11 @@
 
 use super::learn::FlexsplineSlip;
 use super::{
-    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, Marked, STORE_MARK, apart, clear, copied, get,
-    get_mut, give, put, span, status, usable,
+    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STORE_MARK, apart, clear, copied, get, get_mut,
+    give, put, span, status, usable,
 };
 use crate::{GeneratorAngle, Implausible, Joint, OutputAngle, Readings, StartUp, StartUpSettings, Store};
-use core::mem::{MaybeUninit, align_of, size_of};
+use core::mem::MaybeUninit;
 
 /// Eight-byte words of a [`FlexsplineStartUp`].
 pub const FLEXSPLINE_START_UP_WORDS: usize = 32;
@@ -89,10 +89,6 @@ pub struct FlexsplineStartUpStep {
 }
 
 const START_UP_MARK: u32 = 0x7843_5446;
-
-const _: () = {
-    assert!(size_of::<Marked<StartUp>>() <= size_of::<FlexsplineStartUp>() && align_of::<Marked<StartUp>>() <= 8);
-};
 
 /// Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
 /// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to decide or too long, or the ticks too

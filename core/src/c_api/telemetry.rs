@@ -3,11 +3,12 @@
 use super::beside::{FLEXSPLINE_RECORD_BYTES, health_code, health_of, quality_code, quality_of};
 use super::names::FLEXSPLINE_MODE_SAFE;
 use super::{
-    FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, Marked, STATE_MARK, STORE_MARK, apart, clear,
-    copied, get, get_mut, give, given, put, span, status, usable,
+    FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, STATE_MARK, STORE_MARK, apart, clear, copied,
+    get, get_mut, give, given, put, span, status, usable,
 };
-use crate::{JointState, Mode, RateGroup, Record, RecordError, Store};
-use core::mem::{MaybeUninit, align_of, size_of};
+use crate::telemetry::is_due;
+use crate::{JointState, Mode, Record, RecordError, Store};
+use core::mem::{MaybeUninit, size_of};
 
 /// Eight-byte words of a [`FlexsplineRecorder`].
 pub const FLEXSPLINE_RECORDER_WORDS: usize = 4;
@@ -78,10 +79,6 @@ struct KeptRing {
 }
 
 const RECORDER_MARK: u32 = 0x7852_5446;
-
-const _: () = {
-    assert!(size_of::<Marked<KeptRing>>() <= size_of::<FlexsplineRecorder>() && align_of::<Marked<KeptRing>>() <= 8);
-};
 
 fn c_record(record: &Record) -> FlexsplineRecord {
     FlexsplineRecord {

@@ -1,11 +1,11 @@
 //! Which torque a tick is given, how old it is, and the rate that goes with a command.
 
 use super::{
-    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, Marked, STORE_MARK, apart, clear, copied, get,
-    get_mut, give, put, span, status, usable,
+    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STORE_MARK, apart, clear, copied, get, get_mut,
+    give, put, span, status, usable,
 };
 use crate::{Aged, Direction, Joint, MotionAhead, OutputAngle, Store, TorquePath, TorqueReading, TorqueSettings};
-use core::mem::{MaybeUninit, align_of, size_of};
+use core::mem::MaybeUninit;
 
 /// Eight-byte words of a [`FlexsplineTorquePath`].
 pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 8;
@@ -53,13 +53,6 @@ pub struct FlexsplineTorqueSettings {
 
 const TORQUE_PATH_MARK: u32 = 0x7854_5446;
 const AGED_MARK: u32 = 0x7847_5446;
-
-const _: () = {
-    assert!(
-        size_of::<Marked<TorquePath>>() <= size_of::<FlexsplineTorquePath>() && align_of::<Marked<TorquePath>>() <= 8
-    );
-    assert!(size_of::<Marked<Aged>>() <= size_of::<FlexsplineAged>() && align_of::<Marked<Aged>>() <= 8);
-};
 
 /// The direction of a sign: what is 0 is none.
 fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
