@@ -8,6 +8,23 @@ pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     !crc_bytes(CRC_START, bytes)
 }
 
+/// Writes words, lowest byte first, and behind them the CRC-32 of all before; nothing where there is no room for that.
+pub(crate) fn seal(bytes: &mut [u8], words: impl IntoIterator<Item = u32>) {
+    let Some((contents, crc)) = bytes.split_last_chunk_mut::<4>() else { return };
+    for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
+        *to = from.to_le_bytes();
+    }
+    *crc = crc32(contents).to_le_bytes();
+}
+
+/// The words that [`seal`] wrote, one with each call, then zeros; `None` if the CRC-32 is another.
+pub(crate) fn unseal(bytes: &[u8]) -> Option<impl FnMut() -> u32> {
+    let (contents, crc) = bytes.split_last_chunk::<4>()?;
+    let mut words = contents.as_chunks::<4>().0.iter();
+    let whole = u32::from_le_bytes(*crc) == crc32(contents);
+    whole.then_some(move || words.next().map_or(0, |word| u32::from_le_bytes(*word)))
+}
+
 /// Before the first byte of a CRC-32.
 pub(crate) const CRC_START: u32 = 0xffff_ffff;
 

@@ -13,7 +13,8 @@
 //! many steps a motion is cut into, and no rounding builds up.
 
 use crate::angle::{OutputAngle, RAD_PER_COUNT};
-use crate::crc::crc32;
+use crate::crc::{seal, unseal};
+use crate::whole::{high, low};
 
 /// A direction of motion of the *output*.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -66,7 +67,6 @@ pub struct PlayState {
 
 /// Size of a saved state.
 pub const SAVED_STATE_BYTES: usize = 28;
-const SAVED_BEFORE_CRC: usize = 24;
 
 impl Default for PlayState {
     fn default() -> Self {
@@ -203,16 +203,8 @@ impl PlayState {
     #[must_use]
     pub fn save(&self) -> [u8; SAVED_STATE_BYTES] {
         let mut bytes = [0; SAVED_STATE_BYTES];
-        let fields = [self.error, self.lower, self.upper, self.half];
-        let parts =
-            self.nominal.counts().to_le_bytes().into_iter().chain(fields.into_iter().flat_map(i32::to_le_bytes));
-        for (to, from) in bytes.iter_mut().zip(parts) {
-            *to = from;
-        }
-        let crc = crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>().unwrap_or(&[0; SAVED_BEFORE_CRC]));
-        for (to, from) in bytes.iter_mut().skip(SAVED_BEFORE_CRC).zip(crc.to_le_bytes()) {
-            *to = from;
-        }
+        let (nominal, parts) = self.parts();
+        seal(&mut bytes, [low(nominal), high(nominal)].into_iter().chain(parts.map(|part| part as u32)));
         bytes
     }
 
@@ -221,15 +213,9 @@ impl PlayState {
     /// Restore only if the joint cannot have moved meanwhile, else start from [`Self::unknown`].
     #[must_use]
     pub fn restore(bytes: &[u8; SAVED_STATE_BYTES]) -> Option<Self> {
-        let (counts, rest) = bytes.split_first_chunk::<8>()?;
-        let (error, rest) = rest.split_first_chunk::<4>()?;
-        let (lower, rest) = rest.split_first_chunk::<4>()?;
-        let (upper, rest) = rest.split_first_chunk::<4>()?;
-        let (half, rest) = rest.split_first_chunk::<4>()?;
-        let crc = rest.first_chunk::<4>()?;
-        let intact = u32::from_le_bytes(*crc) == crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>()?);
-        let parts = [error, lower, upper, half].map(|part| i32::from_le_bytes(*part));
-        Self::of(i64::from_le_bytes(*counts), parts).filter(|_| intact)
+        let mut next = unseal(bytes)?;
+        let nominal = next() as i64 | (next() as i64) << 32;
+        Self::of(nominal, [next(), next(), next(), next()].map(|part| part as i32))
     }
 }
 

@@ -33,14 +33,14 @@ pub use predictor::{
 };
 pub use runtime::Joint;
 pub use signals::{Flags, Input, Output};
+#[cfg(any(test, feature = "c-api"))]
+pub(crate) use slip::NOBODY;
 pub use slip::{
     LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
-#[cfg(any(test, feature = "c-api"))]
-pub(crate) use slip::{NOBODY, owner};
 pub use start_up::{Implausible, Readings, StartUp, StartUpSettings, StartUpStep};
-#[cfg(any(test, feature = "std"))]
-pub use state::JOINT_STATE_WORDS;
+#[cfg(any(test, feature = "c-api"))]
+pub(crate) use state::owner;
 pub use state::{JointState, RestoreError, SAVED_JOINT_BYTES};
 pub use torque_path::{TorquePath, TorqueReading, TorqueSettings};

@@ -21,9 +21,9 @@
 
 use super::adjustment::Adjustment;
 use super::runtime::Joint;
-use super::state::RestoreError;
-use crate::angle::{COUNTS_PER_RAD, OutputAngle, RAD_PER_COUNT, counts_from_rad};
-use crate::crc::crc32;
+use super::state::{RestoreError, opened, owner};
+use crate::angle::{OutputAngle, RAD_PER_COUNT, counts_from_rad};
+use crate::crc::{crc32, seal};
 use crate::num;
 use crate::play::MAX_HALF_COUNTS;
 use crate::store::Store;
@@ -310,15 +310,10 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         let springs = self.springs.open()?;
         let state = state.deflections.open().filter(|state| state.started != 0)?;
         let bytes = bytes.get_mut(..saved_slip_bytes(used))?;
-        let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
         let head = [u32::from_le_bytes(SAVED_MARK)].into_iter().chain(owner);
         let at = [state.at as u32, (state.at >> 32) as u32];
         let ends = state.lower.iter().take(used).chain(state.upper.iter().take(used));
-        let words = head.chain(at).chain(ends.map(|end| *end as u32)).chain([springs.sum]);
-        for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
-            *to = from.to_le_bytes();
-        }
-        *crc = crc32(contents).to_le_bytes();
+        seal(bytes, head.chain(at).chain(ends.map(|end| *end as u32)).chain([springs.sum]));
         Some(saved_slip_bytes(used))
     }
 
@@ -347,24 +342,7 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
     ) -> Result<SlipState<N, V>, RestoreError> {
         let springs = self.springs.open().ok_or(RestoreError::OtherJoint)?;
         let bytes = bytes.get(..saved_slip_bytes(used)).ok_or(RestoreError::Crc)?;
-        let (contents, crc) = bytes.split_last_chunk::<4>().ok_or(RestoreError::Crc)?;
-        let words = contents.as_chunks::<4>().0;
-        let found = words.first().copied().unwrap_or_default();
-        if found != SAVED_MARK {
-            return Err(RestoreError::Version { found });
-        }
-        if u32::from_le_bytes(*crc) != crc32(contents) {
-            return Err(RestoreError::Crc);
-        }
-        let mut words = words.iter().skip(1).map(|word| u32::from_le_bytes(*word));
-        let mut next = || words.next().unwrap_or_default();
-        let [low, high, joint_low, joint_high] = owner;
-        if [next(), next()] != [low, high] {
-            return Err(RestoreError::OtherTable);
-        }
-        if [next(), next()] != [joint_low, joint_high] {
-            return Err(RestoreError::OtherJoint);
-        }
+        let mut next = opened(bytes, SAVED_MARK, owner)?;
         let (low, high) = (next(), next());
         let mut state = Deflections { at: (high as i64) << 32 | low as i64, started: 1, ..Deflections::of(true) };
         for to in state.lower.iter_mut().take(used).chain(state.upper.iter_mut().take(used)) {
@@ -411,13 +389,6 @@ impl<const N: usize, V> SlipState<N, V> {
     pub fn is_known(&self) -> bool {
         self.deflections.open().is_some_and(|state| state.lower == state.upper)
     }
-}
-
-/// Who a saved state belongs to: the table and the joint.
-pub(crate) fn owner(joint: &Joint, store: &Store) -> [u32; 4] {
-    let [a, b, c, d, e, f, g, h] = store.id().0;
-    let [low, high] = joint.sums();
-    [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]), low, high]
 }
 
 #[cfg(test)]

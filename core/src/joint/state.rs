@@ -3,7 +3,7 @@
 use super::mode::{Mode, ModeError};
 use super::runtime::Joint;
 use crate::angle::GeneratorAngle;
-use crate::crc::crc32;
+use crate::crc::{seal, unseal};
 use crate::play::{MOST_ERROR_COUNTS, PlayState};
 use crate::store::Store;
 use crate::whole::{SUMS_START, high, low, pair, same, sums};
@@ -166,6 +166,32 @@ impl fmt::Display for RestoreError {
 
 impl core::error::Error for RestoreError {}
 
+/// Table and joint that something saved belongs to.
+pub(crate) fn owner(joint: &Joint, store: &Store) -> [u32; 4] {
+    let [a, b, c, d, e, f, g, h] = store.id().0;
+    let ([turned, added], table) = (joint.sums(), [[a, b, c, d], [e, f, g, h]].map(u32::from_le_bytes));
+    let [low, high] = table;
+    [low, high, turned, added]
+}
+
+/// Words of something saved behind its mark and its owner, which must be these.
+pub(super) fn opened(bytes: &[u8], mark: [u8; 4], owner: [u32; 4]) -> Result<impl FnMut() -> u32, RestoreError> {
+    let found = bytes.first_chunk::<4>().copied().unwrap_or_default();
+    if found != mark {
+        return Err(RestoreError::Version { found });
+    }
+    let mut next = unseal(bytes).ok_or(RestoreError::Crc)?;
+    let [_, low, high, turned, added] = [next(), next(), next(), next(), next()];
+    let [own_low, own_high, own_turned, own_added] = owner;
+    if [low, high] != [own_low, own_high] {
+        return Err(RestoreError::OtherTable);
+    }
+    if [turned, added] != [own_turned, own_added] {
+        return Err(RestoreError::OtherJoint);
+    }
+    Ok(next)
+}
+
 /// How a state was found.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum CopyStatus {
@@ -305,15 +331,11 @@ impl JointState {
         let (kept, found) = self.open();
         let (nominal, [error, lower, upper, half]) = kept.play.parts();
         let generator = kept.generator.counts();
-        let [[a, b, c, d], [e, f, g, h]] = {
-            let [a, b, c, d, e, f, g, h] = store.id().0;
-            [[a, b, c, d], [e, f, g, h]]
-        };
-        let [turned, added] = joint.sums();
+        let [table, more, turned, added] = owner(joint, store);
         let words = [
             u32::from_le_bytes(SAVED_MARK),
-            u32::from_le_bytes([a, b, c, d]),
-            u32::from_le_bytes([e, f, g, h]),
+            table,
+            more,
             turned,
             added,
             low(nominal),
@@ -330,13 +352,10 @@ impl JointState {
             kept.marks & FLANK,
         ];
         let mut bytes = [0; SAVED_JOINT_BYTES];
-        for (to, from) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words) {
-            *to = from.to_le_bytes();
-        }
-        if let Some((before, sum)) = bytes.split_last_chunk_mut::<4>() {
-            // A state that is lost is not to come back as one that was saved.
-            let spoilt = if found == CopyStatus::Lost { u32::MAX } else { 0 };
-            *sum = (crc32(before) ^ spoilt).to_le_bytes();
+        seal(&mut bytes, words);
+        if found == CopyStatus::Lost {
+            // It is not to come back as one that was saved.
+            bytes.iter_mut().rev().take(4).for_each(|byte| *byte = !*byte);
         }
         bytes
     }
@@ -352,26 +371,13 @@ impl JointState {
     /// # Errors
     /// [`RestoreError`]; then [`Self::new`] is left.
     pub fn restore(bytes: &[u8; SAVED_JOINT_BYTES], joint: &Joint, store: &Store) -> Result<Self, RestoreError> {
-        let words = bytes.as_chunks::<4>().0;
-        let word = |i: usize| words.get(i).copied().unwrap_or_default();
-        let number = |i: usize| u32::from_le_bytes(word(i));
-        let signed = |i: usize| number(i) as i32;
-        let long = |i: usize| (signed(i.wrapping_add(1)) as i64) << 32 | number(i) as i64;
-        if word(0) != SAVED_MARK {
-            return Err(RestoreError::Version { found: word(0) });
-        }
-        let (before, sum) = bytes.split_last_chunk::<4>().ok_or(RestoreError::Crc)?;
-        if crc32(before) != u32::from_le_bytes(*sum) {
-            return Err(RestoreError::Crc);
-        }
-        if !store.id().0.iter().eq([word(1), word(2)].as_flattened()) {
-            return Err(RestoreError::OtherTable);
-        }
-        if !same([number(3), number(4)], joint.sums()) {
-            return Err(RestoreError::OtherJoint);
-        }
-        let play = PlayState::of(long(5), [7, 8, 9, 10].map(signed)).ok_or(RestoreError::Impossible)?;
-        let (adjusted, correction, speed, flank) = (signed(11), signed(14), signed(15), number(16));
+        let mut next = opened(bytes, SAVED_MARK, owner(joint, store))?;
+        let nominal = next() as i64 | (next() as i64) << 32;
+        let parts = [next(), next(), next(), next()].map(|part| part as i32);
+        let play = PlayState::of(nominal, parts).ok_or(RestoreError::Impossible)?;
+        let adjusted = next() as i32;
+        let generator = next() as i64 | (next() as i64) << 32;
+        let ([correction, speed], flank) = ([next(), next()].map(|fine| fine as i32), next());
         let small = [correction, speed].iter().all(|fine| fine.unsigned_abs() <= MOST_FINE);
         // A side is rested on once there was a sample, and forgotten with the play.
         let one_flank = flank & !FLANK == 0 && flank != FLANK && (flank == 0 || play.is_started());
@@ -381,7 +387,7 @@ impl JointState {
         let kept = Kept {
             play,
             adjusted,
-            generator: GeneratorAngle::from_counts(long(12)),
+            generator: GeneratorAngle::from_counts(generator),
             correction,
             goal: correction,
             speed,

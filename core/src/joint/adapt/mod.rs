@@ -64,8 +64,9 @@ pub use state::{AdaptCounters, AdaptState, Learning, Verdict};
 use super::adjustment::Adjustment;
 use super::runtime::Joint;
 use super::signals::{Flags, Input, Output};
+use super::state::owner;
 use crate::angle::{COUNTS_PER_RAD, GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
-use crate::crc::crc32;
+use crate::crc::{crc32, seal};
 use crate::num;
 use crate::play::PlayState;
 use crate::store::Store;
@@ -502,14 +503,9 @@ impl<const N: usize> Adapter<N> {
     /// The same for the first N coefficients.
     pub(crate) fn save_first(&self, state: &AdaptState<N>, used: usize, bytes: &mut [u8]) -> Option<usize> {
         let bytes = bytes.get_mut(..saved_adapt_bytes(used))?;
-        let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
         let above = state.u.iter().take(used).enumerate().flat_map(|(j, column)| column.iter().take(j));
         let numbers = state.x.iter().take(used).chain(state.d.iter().take(used)).chain(above);
-        let words = self.heading().into_iter().chain(numbers.map(|number| number.to_bits()));
-        for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
-            *to = from.to_le_bytes();
-        }
-        *crc = crc32(contents).to_le_bytes();
+        seal(bytes, self.heading().into_iter().chain(numbers.map(|number| number.to_bits())));
         Some(saved_adapt_bytes(used))
     }
 
@@ -598,8 +594,7 @@ crate::upset::upsets!(Owner { table, joint, unit });
 
 impl Owner {
     fn of(joint: &Joint, store: &Store, unit: u32) -> Self {
-        let [a, b, c, d, e, f, g, h] = store.id().0;
-        let table = [[a, b, c, d], [e, f, g, h]].map(u32::from_le_bytes);
-        if table == [0; 2] { Self::default() } else { Self { table, joint: joint.sums(), unit } }
+        let [a, b, c, d] = owner(joint, store);
+        if [a, b] == [0; 2] { Self::default() } else { Self { table: [a, b], joint: [c, d], unit } }
     }
 }
