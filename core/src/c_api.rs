@@ -824,7 +824,7 @@ fn core_input(input: &FlexsplineInput) -> Input {
         target: OutputAngle::from_counts(input.target_counts),
         torque_n_m: input.torque_n_m,
         missed_ticks: input.missed_ticks,
-        adjustment: Adjustment { mean_counts: input.mean_counts, half_width_counts: input.half_width_counts },
+        adjustment: Adjustment::new(input.mean_counts, input.half_width_counts),
     }
 }
 

@@ -95,7 +95,7 @@
 //! #     adjustment: Adjustment::default(),
 //! # };
 //! # let next = after_tick(&input, &output, &PlayState::unknown(), Some(OutputAngle::ZERO.offset_rad(5e-4)));
-//! # assert!(next.mean_counts > 0);
+//! # assert!(next.mean_counts() > 0);
 //! # Ok::<(), AdaptError>(())
 //! ```
 //! Elastic hysteresis, as springs that slip ([`SlipBank`]), over the nominal output or over the torque:

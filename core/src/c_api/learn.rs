@@ -353,8 +353,8 @@ pub extern "C" fn flexspline_learner_update(
         give(
             adapted,
             FlexsplineAdapted {
-                mean_counts: found.adjustment.mean_counts,
-                half_width_counts: found.adjustment.half_width_counts,
+                mean_counts: found.adjustment.mean_counts(),
+                half_width_counts: found.adjustment.half_width_counts(),
                 uncertainty_rad: found.uncertainty_rad,
                 verdict: match found.verdict {
                     Verdict::Idle => FLEXSPLINE_VERDICT_IDLE,
@@ -364,6 +364,7 @@ pub extern "C" fn flexspline_learner_update(
                     Verdict::Unsettled => FLEXSPLINE_VERDICT_UNSETTLED,
                     Verdict::Unexcited => FLEXSPLINE_VERDICT_UNEXCITED,
                     Verdict::Untrusted => FLEXSPLINE_VERDICT_UNTRUSTED,
+                    Verdict::Lost => FLEXSPLINE_VERDICT_LOST,
                 },
             },
         )
@@ -654,11 +655,8 @@ pub extern "C" fn flexspline_input_add(
 ) -> FlexsplineStatus {
     let add = || {
         let before = copied(input)?;
-        let sum = |one: i32, other: i32| {
-            one.saturating_add(other).max(Adjustment::MAX_COUNTS.wrapping_neg()).min(Adjustment::MAX_COUNTS)
-        };
-        let mean_counts = sum(before.mean_counts, mean_counts);
-        let half_width_counts = sum(before.half_width_counts, half_width_counts);
+        let sum = core_input(&before).adjustment.plus(Adjustment::new(mean_counts, half_width_counts));
+        let (mean_counts, half_width_counts) = (sum.mean_counts(), sum.half_width_counts());
         give(input, FlexsplineInput { mean_counts, half_width_counts, ..before })
     };
     status(add())
@@ -671,6 +669,6 @@ pub extern "C" fn flexspline_input_add_rad(
     mean_rad: f32,
     half_width_rad: f32,
 ) -> FlexsplineStatus {
-    let Adjustment { mean_counts, half_width_counts } = Adjustment::from_rad(mean_rad, half_width_rad);
-    flexspline_input_add(input, mean_counts, half_width_counts)
+    let added = Adjustment::from_rad(mean_rad, half_width_rad);
+    flexspline_input_add(input, added.mean_counts(), added.half_width_counts())
 }

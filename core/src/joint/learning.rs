@@ -1,5 +1,5 @@
 //! Learning with its settings and its state each under a sum ([`whole`](../../whole.rs)): where an upset hit one word
-//! of them it is mended in the next update. Settings that are lost add nothing ([`Verdict::Untrusted`]); what was
+//! of them it is mended in the next update. Settings that are lost add nothing ([`Verdict::Lost`]); what was
 //! learnt and is lost begins anew from zero, off, and is counted ([`AdaptCounters::restarts`]). What it adds is bounded
 //! by the limits of the coefficients, whatever the state.
 
@@ -70,7 +70,9 @@ impl<const N: usize> Adapter<N> {
     /// that is used takes 2303 instructions for five coefficients, whatever the values, and one without at most 921
     /// (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
-        let nothing = Adapted { adjustment: Adjustment::default(), uncertainty_rad: 0.0, verdict: Verdict::Untrusted };
+        let uncertainty_rad = Adjustment::MAX_RAD;
+        let adjustment = Adjustment::default().with_uncertainty(uncertainty_rad);
+        let nothing = Adapted { adjustment, uncertainty_rad, verdict: Verdict::Lost };
         self.on(state, |adapter, learnt| adapter.update(learnt, seen)).unwrap_or(nothing)
     }
 

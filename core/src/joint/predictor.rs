@@ -397,10 +397,14 @@ impl Predictor {
     /// One tick: what the last estimate leads to, corrected by what was measured. The same work for all values.
     ///
     /// False, and the estimate stays, if a number that is used is not finite or beyond any drive (`MOST`), or the
-    /// estimate would come to be; and if model or estimate are lost: make them anew.
+    /// estimate would come to be. Where the model is lost the estimate is lost with it, and says NaN: make them anew.
     #[inline]
     pub fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
-        self.model.with(|model| model.step(state, measured)).unwrap_or(false)
+        let done = self.model.with(|model| model.step(state, measured));
+        if done.is_none() {
+            *state = PredictorState::LOST;
+        }
+        done.unwrap_or(false)
     }
 
     /// Largest error of the estimate when the disturbances stay within these bounds, once the start is forgotten: φ
@@ -626,6 +630,9 @@ impl Default for PredictorState {
 }
 
 impl PredictorState {
+    /// Not whole.
+    const LOST: Self = Self { x: Sealed::of(Vector4::new(0.0, 0.0, 0.0, 0.0), 0) };
+
     /// At rest, without load.
     #[must_use]
     pub fn new() -> Self {

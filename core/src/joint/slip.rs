@@ -19,7 +19,7 @@
 //! mended in the next update. Deflections that are lost are unknown, as after a reset; springs that are lost add
 //! nothing, with an uncertainty of [`Adjustment::MAX_RAD`].
 
-use super::adjustment::Adjustment;
+use super::adjustment::{Adjustment, bounded, uncertainty_counts};
 use super::runtime::Joint;
 use super::state::{RestoreError, opened, owner};
 use crate::angle::{OutputAngle, RAD_PER_COUNT, counts_from_rad};
@@ -122,15 +122,13 @@ impl Slip {
     /// The error in counts, within ±[`Adjustment::MAX_COUNTS`]: to be added to the mean of an [`Adjustment`].
     #[must_use]
     pub fn mean_counts(&self) -> i32 {
-        Adjustment::from_rad(self.error_rad, 0.0).mean_counts
+        bounded(counts_from_rad(self.error_rad))
     }
 
-    /// An adjustment with this added.
+    /// An adjustment with this added, and its uncertainty: while springs are not known the tick says so.
     #[must_use]
     pub fn added_to(&self, adjustment: Adjustment) -> Adjustment {
-        let most = Adjustment::MAX_COUNTS;
-        let sum = adjustment.mean_counts.saturating_add(self.mean_counts());
-        Adjustment { mean_counts: sum.max(most.wrapping_neg()).min(most), ..adjustment }
+        adjustment.with([self.mean_counts(), 0, uncertainty_counts(self.uncertainty_rad)])
     }
 }
 
@@ -506,10 +504,10 @@ mod tests {
         }
         assert!((at(&mut state, f32::MAX) - slipping).abs() < 1e-11);
         assert!((at(&mut state, -f32::MAX) + slipping).abs() < 1e-11);
-        let adjustment = Adjustment { mean_counts: 100, half_width_counts: 7 };
+        let adjustment = Adjustment::new(100, 7);
         let slip = torque_bank().update(&mut state, f32::MAX);
         let added = slip.added_to(adjustment);
-        assert_eq!(added, Adjustment { mean_counts: 100 + slip.mean_counts(), half_width_counts: 7 });
+        assert_eq!(added, Adjustment::new(100 + slip.mean_counts(), 7));
         assert!((slip.mean_counts() as f64 - slipping * COUNTS_PER_RAD as f64).abs() < 1.0);
         let full = Adjustment::new(i32::MAX, 0);
         assert_eq!(slip.added_to(full).mean_counts(), Adjustment::MAX_COUNTS);

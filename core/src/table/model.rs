@@ -144,7 +144,7 @@ impl<M: Memory> TableModel<'_, M> {
                 (minus(target, error), error, 0, sane)
             }
             Approach::From(state) if state.is_started() => {
-                let from = departure(self.memory.plan(), point, target, state, state.output_or_zero());
+                let from = departure(self.memory.plan(), point, target, state, (state.output_or_zero(), 0));
                 let (error, sane) = self.solve(point, target, from.backward, &mut doubt);
                 let nominal = minus(target, error);
                 let held = (state.nominal_or_zero(), state.error_counts());
@@ -247,21 +247,23 @@ const fn minus(angle: OutputAngle, counts: i32) -> OutputAngle {
     angle.offset_counts((counts as i64).wrapping_neg())
 }
 
-/// Whether and to which side the play must be taken up on the way from where the output is to `target`.
+/// Whether and to which side the play must be taken up on the way from where the output is, which is known to within
+/// these counts more than its play, to `target`.
 #[inline(always)]
 pub(crate) fn departure(
     plan: &PointPlan,
     point: &OperatingPoint,
     target: OutputAngle,
     state: &PlayState,
-    output: OutputAngle,
+    (output, off): (OutputAngle, i32),
 ) -> Departure {
     let ahead = target.minus_near_counts(output);
     let away = ahead.saturating_abs();
     let hold = away <= plan.hold;
     let unknown = state.uncertainty_counts();
     // A target inside the interval may lie on the other side of the output: then the whole play is in doubt.
-    let guess = if (away <= unknown) & (unknown > 0) { point.half_width.wrapping_mul(2) } else { 0 };
+    let within = unknown.saturating_add(off);
+    let guess = if (away <= within) & (within > 0) { point.half_width.wrapping_mul(2) } else { 0 };
     Departure { backward: ahead <= 0, unknown, guess, hold, ahead }
 }
 

@@ -75,7 +75,8 @@ impl Format for Counters {
 
 impl Format for Adjustment {
     fn format(&self, f: Formatter<'_>) {
-        write!(f, "mean {=i32} half-width {=i32} counts", self.mean_counts, self.half_width_counts);
+        let [mean, half_width] = [self.mean_counts(), self.half_width_counts()];
+        write!(f, "mean {=i32} half-width {=i32} counts ±{=f32} rad", mean, half_width, self.uncertainty_rad());
     }
 }
 

@@ -91,9 +91,11 @@ pub struct Seen<'s> {
 /// Addition to the table in the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted {
-    /// For [`Input`](crate::Input) of the next tick.
+    /// For [`Input`](crate::Input) of the next tick. Where learning is lost it adds nothing, with all that coefficients
+    /// can have added as its uncertainty, until [`AdaptState::set_learning`] is called or the adapter is made anew.
     pub adjustment: Adjustment,
-    /// Standard deviation of what it adds to the error, rad.
+    /// Standard deviation of what it adds to the error, rad: no bound, so the adjustment does not have it. Where
+    /// learning is lost that of the adjustment.
     pub uncertainty_rad: f32,
     /// Verdict on the measurement.
     pub verdict: Verdict,
@@ -274,7 +276,7 @@ impl<const N: usize> Adapter<N> {
 
     /// Forgets what was learnt; counters and [`Learning`] stay. The joint's limiter takes the adjustment out.
     pub fn reset(&self, state: &mut AdaptState<N>) {
-        let AdaptState { learning, counters, .. } = *state;
+        let (learning, counters) = (state.learning().code(), state.counters);
         *state = AdaptState { learning, counters, ..self.start() };
     }
 
@@ -362,6 +364,9 @@ impl<const N: usize> Adapter<N> {
         if !trusted {
             return Verdict::Untrusted;
         }
+        let Some([mean_counts, half_width_counts, _]) = seen.input.adjustment.open() else {
+            return Verdict::Untrusted;
+        };
         let side = match contact {
             Contact::Unknown => 0,
             Contact::Crossing => return Verdict::Unsettled,
@@ -379,7 +384,6 @@ impl<const N: usize> Adapter<N> {
         // What the table alone missed, less what is known of it already.
         let most = Adjustment::MAX_COUNTS;
         let applied = |counts: i32| counts.max(most.wrapping_neg()).min(most);
-        let Adjustment { mean_counts, half_width_counts } = seen.input.adjustment;
         let half = side.wrapping_mul(applied(half_width_counts));
         let beside = applied(mean_counts).wrapping_sub(half) as i64;
         let missed = measured.offset_counts(beside).minus_small_counts(out.output) as f32 / self.noise_counts;
@@ -450,8 +454,14 @@ impl<const N: usize> Adapter<N> {
     }
 
     fn adapted(&self, state: &AdaptState<N>, row: &[f32; N], verdict: Verdict) -> Adapted {
-        if state.learning() == Learning::Off || !state.x.iter().all(|x| x.abs() <= 1.0) {
-            return Adapted { adjustment: Adjustment::default(), uncertainty_rad: 0.0, verdict };
+        let noise_rad = self.noise_counts * RAD_PER_COUNT;
+        let is_lost = state.learning == Learning::LOST || !state.x.iter().all(|x| x.abs() <= 1.0);
+        if is_lost || state.learning() == Learning::Off {
+            // All that coefficients can have added here.
+            let uncertainty_rad = if is_lost { row.iter().map(|h| h.abs()).sum::<f32>() * noise_rad } else { 0.0 };
+            let adjustment = Adjustment::default().with_uncertainty(uncertainty_rad);
+            let verdict = if is_lost { Verdict::Lost } else { verdict };
+            return Adapted { adjustment, uncertainty_rad, verdict };
         }
         let (mut mean, mut half) = (0.0, 0.0);
         let parts = self.terms.iter().zip(state.x).zip(row.iter().zip(self.per_noise));
@@ -461,7 +471,6 @@ impl<const N: usize> Adapter<N> {
                 _ => mean += x * h,
             }
         }
-        let noise_rad = self.noise_counts * RAD_PER_COUNT;
         let learnt = spread_of(&transform(&state.u, row), &state.d);
         let variance = learnt + state.consistency.doubt(spread_of(row, &self.first));
         Adapted {

@@ -35,6 +35,8 @@ pub enum Verdict {
     /// The tick itself was not to be trusted: sample lost or not believed, torque out of range or not finite, table in
     /// doubt.
     Untrusted,
+    /// What was learnt, or the settings, are lost to an upset: nothing is added.
+    Lost,
 }
 
 /// How many measurements of each [`Verdict`], and what else happened; all stop at their largest value.
@@ -123,7 +125,7 @@ impl AdaptCounters {
     pub(super) fn note(&mut self, verdict: Verdict) {
         let one = |counter: &mut u32| *counter = counter.saturating_add(1);
         match verdict {
-            Verdict::Idle => return,
+            Verdict::Idle | Verdict::Lost => return,
             Verdict::Used => one(&mut self.used),
             Verdict::Quiet => one(&mut self.quiet),
             Verdict::Outlier => one(&mut self.outliers),

@@ -58,6 +58,9 @@ impl Term {
 }
 
 impl Learning {
+    /// By definition [`Self::Off`], and what was learnt is lost; nobody has switched it since.
+    pub(super) const LOST: u32 = 3;
+
     pub(super) const fn code(self) -> u32 {
         match self {
             Self::Off => 0,
@@ -77,10 +80,10 @@ impl Learning {
 }
 
 impl<const N: usize> Adapter<N> {
-    /// A state for one that is lost: nothing learnt, off, and counted.
+    /// A state for one that is lost: nothing learnt, off until it is switched, and counted.
     pub(in crate::joint) fn begin_again(&self) -> AdaptState<N> {
         let counters = AdaptCounters { restarts: 1, ..AdaptCounters::default() };
-        AdaptState { counters, ..self.start() }
+        AdaptState { counters, learning: Learning::LOST, ..self.start() }
     }
 }
 

@@ -126,7 +126,7 @@ fn run(counter: &Counter) -> Option<[Range; 6]> {
         }
         let (count, added) = counter.of(|| black_box(slip(&bank, &mut springs, output.output, adjustment)));
         ranges[2].add(count);
-        sum = sum.wrapping_add(added.1.mean_counts as u32);
+        sum = sum.wrapping_add(added.1.mean_counts() as u32);
         let (count, _) = counter.of(|| black_box(push(&mut ring, tick, &state, &store, &output)));
         // The first are before it is full.
         if tick > 16 {
