@@ -90,7 +90,7 @@ pub enum FlexsplineStatus {
 
 /// There was no sample.
 pub const FLEXSPLINE_FLAG_SAMPLE_LOST: u16 = 1;
-/// The sample was not believed.
+/// The sample was not believed; or it was, and what the one before it did to the play was taken back.
 pub const FLEXSPLINE_FLAG_GLITCH: u16 = 2;
 /// The tick came late.
 pub const FLEXSPLINE_FLAG_OVERRUN: u16 = 4;

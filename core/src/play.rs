@@ -168,13 +168,14 @@ impl PlayState {
         self.half >= 0
     }
 
-    /// Moves the play to `nominal`, with the centre and half-width there in counts; returns the error `p − x`.
+    /// Moves the play to `nominal`, with the centre and half-width there in counts; the error `p − x`, and the bounds
+    /// of the offset as they would be if no flank had taken the output along ([`Self::take_back`]).
     ///
     /// Without either (`sane` is false: they could not be computed) it follows the motion with the centre and
     /// half-width of the last update; before the first with a half-width that is wider than any. Masks instead of
     /// choices: the same work for all.
     #[inline(always)]
-    pub(crate) const fn update(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> i32 {
+    pub(crate) const fn follow(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> (i32, [i32; 2]) {
         let mask = (sane as i32).wrapping_neg();
         let started = !(self.half >> 31);
         let last = if self.half < 0 { MAX_PLAY_COUNTS } else { self.half };
@@ -184,12 +185,32 @@ impl PlayState {
         let centre = last ^ (last ^ centre) & mask;
         // How far the middle of the play went, while the output stayed.
         let moved = nominal.minus_near_counts(self.nominal).saturating_add(centre.wrapping_sub(last)) & started;
-        self.lower = clamped(self.lower.saturating_sub(moved), half);
-        self.upper = clamped(self.upper.saturating_sub(moved), half);
+        let free = [self.lower.saturating_sub(moved), self.upper.saturating_sub(moved)];
+        let [lower, upper] = free;
+        self.lower = clamped(lower, half);
+        self.upper = clamped(upper, half);
         self.nominal = nominal;
         self.half = half;
         self.error = centre.wrapping_add(self.offset_counts());
-        self.error
+        (self.error, free)
+    }
+
+    /// As [`Self::follow`]: the error.
+    #[inline(always)]
+    pub(crate) const fn update(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> i32 {
+        let (error, _) = self.follow(nominal, centre, half, sane);
+        error
+    }
+
+    /// The last move was none: the output is where it was before it, which the next move goes on from. `free` is what
+    /// [`Self::follow`] gave; nothing is done where `taken` is false.
+    #[inline(always)]
+    pub(crate) const fn take_back(&mut self, free: [i32; 2], taken: bool) {
+        let ([lower, upper], mask, offset) = (free, (taken as i32).wrapping_neg(), self.offset_counts());
+        self.lower ^= (self.lower ^ lower) & mask;
+        self.upper ^= (self.upper ^ upper) & mask;
+        // The centre stays.
+        self.error = self.error.wrapping_add(self.offset_counts().wrapping_sub(offset));
     }
 
     /// The estimate of the centre changed, not the position of the drive in its play: the estimated output moves as

@@ -13,6 +13,8 @@
 //! | a sample out and back | takes back what it did to the play, in the next tick | [`Flags::GLITCH`] |
 //! | input not finite, table in doubt | keeps it for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
+//! | an adjustment that is not known | adds its uncertainty | [`Uncertain`](crate::Quality::Uncertain) |
+//! | an adjustment that is lost | as an input that is not finite | [`Flags::NOT_CORRECTED`] |
 //! | torque or temperature out of range | uses the value at the edge | [`Extrapolated`](crate::Quality::Extrapolated) |
 //! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
 //! | a target that leaps | commands the leap: the correction alone is limited | |
@@ -25,12 +27,13 @@
 //! | no sample since a reset | no new correction; the first is compared with a saved one | [`Flags::NOT_CORRECTED`] |
 //! | reset | [`JointState::restore`] goes on; [`JointState::new`] starts uncorrected, play side unknown | |
 
-use super::adjustment::{Adjustment, bounded};
+use super::adjustment::bounded;
 use super::limits::{LEAST_TICK_S, Limits, SettingError, checked};
 use super::mode::{Mode, Overrun};
 use super::signals::{Flags, Input, Output};
 use super::state::{
-    CopyStatus, FINE, FLANK, FLANK_BACKWARD, FLANK_FORWARD, JointState, Kept, MENDED, MODE, SAMPLED, SEEN,
+    CopyStatus, FINE, FLANK, FLANK_BACKWARD, FLANK_BEFORE, FLANK_FORWARD, FLANK_SHIFT, IN_A_ROW, JointState, Kept,
+    MENDED, MODE, SAMPLED, SEEN, UNSEEN_SHIFT,
 };
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
@@ -38,12 +41,17 @@ use crate::encoder::{Encoder, EncoderState};
 use crate::num;
 use crate::play::PlayState;
 use crate::store::{Images, Store, TableStatus};
-use crate::table::{Approach, Command, Estimate, MAX_ERROR_RAD, Memory, Prediction, Quality, TableModel, departure};
+use crate::table::{
+    Approach, Command, Estimate, MAX_ERROR_RAD, Memory, OperatingPoint, Prediction, Quality, TableModel, departure,
+};
 use crate::whole::{SUMS_START, pair, same, sums};
 use core::num::NonZeroU32;
 
 /// Less than a count.
 const WITHIN: i32 = FINE - 1;
+/// Without a given acceleration a sample that is out and back is taken back where it needs full speed in less than 2⁶
+/// ticks. A guess: 64 ms at a thousand ticks a second.
+const SPIKE_SHIFT: u32 = 6;
 
 /// One joint: all that does not change while it runs. Can be made at compile time and lie in flash; in memory an upset
 /// of one of its two copies is noticed in the tick.
@@ -164,9 +172,12 @@ impl Joint {
         counts.map(GeneratorAngle::from_counts)
     }
 
+    /// The table at a torque, for the drive of settings that are whole: a table for another one gives nothing.
     #[inline(always)]
-    fn model<'s>(&'s self, store: &'s Store) -> TableModel<'s, Store> {
-        TableModel { memory: store, drive: self.drive() }
+    fn at<'s>(&'s self, store: &'s Store, torque_n_m: f32) -> (TableModel<'s, Store>, OperatingPoint) {
+        let drive = self.drive();
+        let torque_n_m = if store.is_for(drive) { torque_n_m } else { f32::NAN };
+        (TableModel { memory: store, drive }, store.locate_whole(torque_n_m))
     }
 
     /// One tick.
@@ -345,11 +356,14 @@ impl JointSettings {
         second: bool,
     ) -> Output {
         let (mut now, found) = state.open();
-        let Adjustment { mean_counts, half_width_counts } = input.adjustment;
-        let (mean_given, half_given) = (mean_counts, half_width_counts);
+        // One that is lost is no input, like a torque that is no number.
+        let (torque_n_m, [mean_given, half_given, off]) = match input.adjustment.open() {
+            Some(counts) => (input.torque_n_m, counts),
+            None => (f32::NAN, [now.adjusted, 0, 0]),
+        };
         let (mean_counts, half_width_counts) = (bounded(mean_given), bounded(half_given));
         let is_bounded = (mean_counts ^ mean_given) | (half_width_counts ^ half_given) != 0;
-        let point = store.locate(input.torque_n_m, mean_counts, half_width_counts);
+        let point = store.locate(torque_n_m, mean_counts, half_width_counts);
         // An adjustment is learnt, not moved.
         now.play.shift(mean_counts.wrapping_sub(now.adjusted));
         now.adjusted = mean_counts;
@@ -381,16 +395,17 @@ impl JointSettings {
         let open = from.guess ^ (from.guess ^ from.unknown) & mask;
         // Where the generator is is not known in this tick: the error is any that the table gives.
         let unseen = point.most(store.plan()).wrapping_add(error.wrapping_abs()) & !good as i32;
-        let known = now.play.is_known() & (open <= 0) & (unseen == 0);
+        let known = now.play.is_known() & (open <= 0) & (unseen == 0) & (off == 0);
         let aimed = open.wrapping_add(point.jump);
         let aimed = if sane { aimed } else { store.plan().limit };
         let uncertainty = if aimed > uncertainty { aimed } else { uncertainty };
         let uncertainty = if unseen > uncertainty { unseen } else { uncertainty };
+        let uncertainty = uncertainty.wrapping_add(off);
         // One bit for each flank.
         let flank = FLANK_FORWARD << backward as u32;
         let before = now.marks;
         let flank = before ^ (before ^ flank) & (sane as u32).wrapping_neg();
-        now.marks = before & !(FLANK | MENDED) | flank & FLANK;
+        now.marks = before & !(FLANK | FLANK_BEFORE | MENDED) | flank & FLANK | (before & FLANK) << FLANK_SHIFT;
 
         let (goal, late) = self.goal(&mut now, input, wanted, sane);
         let correction = self.limit(&mut now, goal, point.most(store.plan()).wrapping_mul(FINE));
@@ -441,8 +456,18 @@ impl JointSettings {
         let seen = now.seen();
         // Outside ± the largest move. Without one that was saved the first is believed wherever it is.
         let most = self.largest_move as i64;
-        let beyond = sample.minus_counts(now.generator).wrapping_add(most) as u64;
-        let far = (beyond > most.wrapping_mul(2) as u64) & (seen != 0);
+        let way = sample.minus_counts(now.generator);
+        let far = (way.wrapping_add(most) as u64 > most.wrapping_mul(2) as u64) & (seen != 0);
+        let step = sample.minus_small_counts(now.generator);
+        // The way of a tick that came late is that of several.
+        let in_a_row = now.marks & IN_A_ROW & (input.missed_ticks.min(1) as u32).wrapping_sub(1);
+        let bend = step.saturating_sub(now.step);
+        let size = bend.saturating_abs();
+        // The sample before was out, and this one is back: without that one the way would hardly have changed.
+        let without = bend.saturating_add(now.bend).saturating_add(now.bend).saturating_abs();
+        let back = !lost & (in_a_row == IN_A_ROW) & (size > self.spike) & (without <= size >> 1);
+        let bent = !lost & (in_a_row > 1 << IN_A_ROW.trailing_zeros()) & (size > self.largest_bend);
+        let far = (far | bent) & !back;
         // Arithmetic instead of choices: the compiler makes branches of choices, and then ticks differ.
         let patience = self.patience as u32;
         let glitches = (now.glitches as u32).wrapping_add(1).wrapping_mul(far as u32);
@@ -454,7 +479,20 @@ impl JointSettings {
         now.generator = generator;
         let good = ((!lost & !glitch) as u32).wrapping_neg();
         let seen_now = seen ^ (seen ^ SAMPLED) & good;
-        now.marks = now.marks & !SEEN | seen_now;
+        now.play.take_back(now.free, back);
+        // What moved the flank is taken back with it.
+        let flank = (now.marks ^ now.marks >> FLANK_SHIFT) & FLANK & (back as u32).wrapping_neg();
+        // One more in a row, up to three; one in which a new place is believed has no way.
+        let one = 1 << IN_A_ROW.trailing_zeros();
+        let row = if in_a_row == IN_A_ROW { in_a_row } else { in_a_row.wrapping_add(one) };
+        let row = (if believed { one } else { row }) & good;
+        let unseen = now.unseen().saturating_add(1);
+        let unseen = if unseen >> (32 - UNSEEN_SHIFT) == 0 { unseen } else { now.unseen() } & !good;
+        let rest = now.marks & !(SEEN | IN_A_ROW | u32::MAX << UNSEEN_SHIFT);
+        now.marks = (rest ^ flank) | seen_now | row | unseen << UNSEEN_SHIFT;
+        let half_way = (step >> 1).wrapping_add(now.step >> 1);
+        now.step = if back { half_way } else { step };
+        now.bend = if back { 0 } else { bend };
         // After too long without an answer of the table nobody followed the play; of small numbers the sign shows which
         // is larger.
         let late = patience.wrapping_sub(now.uncorrected as u32) >> 31;
@@ -548,6 +586,7 @@ mod tests {
     use crate::crc::crc32;
     use crate::encoder::{EncoderSettings, EncoderWrap};
     use crate::fixture::{self, ARCSEC, LIMITS};
+    use crate::joint::Adjustment;
     use crate::joint::mode::ModeError;
     use crate::joint::state::{MOST_FINE, RestoreError, SAVED_JOINT_BYTES};
     use crate::table::Quality;
@@ -811,7 +850,7 @@ mod tests {
                     hidden += (off > 2 * fastest + (1 << 23) && !reported) as u32;
                     assert!(tick < 11 || off <= 1 << 21 && !reported, "bit {bit}, {speed}, tick {tick}: {off}");
                 }
-                lost += ((encoder.angle_counts(&alone) - at(13)).abs() > 1 << 31) as u32;
+                lost += ((encoder.angle(&alone).unwrap() - at(13)).abs() > 1 << 31) as u32;
                 trials += 1;
             }
         }

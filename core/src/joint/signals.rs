@@ -27,7 +27,7 @@ pub struct Flags(u16);
 impl Flags {
     /// There was no sample.
     pub const SAMPLE_LOST: Self = Self(1);
-    /// The sample was not believed.
+    /// The sample was not believed; or it was, and what the one before it did to the play was taken back.
     pub const GLITCH: Self = Self(2);
     /// The tick came late.
     pub const OVERRUN: Self = Self(4);
@@ -94,9 +94,9 @@ pub struct Output {
     /// The transmission error now, rad: the output less the nominal one; 0 without a usable torque, temperature or
     /// table. Before the first sample that of generator angle 0, known to [`Self::uncertainty_rad`].
     pub transmission_error_rad: f32,
-    /// It lies within ± this, as far as play and jumps go, rad. Of the estimate, whether it is corrected or not: what
-    /// is left at the output is [`Self::output`] less the target. Without a sample that is believed in this tick: no
-    /// less than the table's limit and the reported uncertainty, which is all that is known.
+    /// It lies within ± this, as far as play, jumps and the adjustment go, rad. Of the estimate, whether it is
+    /// corrected or not: what is left at the output is [`Self::output`] less the target. Without a sample that is
+    /// believed in this tick: no less than the table's limit and the reported uncertainty, which is all that is known.
     pub uncertainty_rad: f32,
     /// The correction in the command: target − command/ratio, rad. It is taken off the target, and so has the sign of
     /// the transmission error that it takes out.

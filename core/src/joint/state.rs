@@ -29,7 +29,7 @@ struct SealedState {
     sums: [u32; 2],
 }
 
-/// Values that a tick changes: 64 bytes, the most that is copied without a call.
+/// Values that a tick changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kept {
     pub play: PlayState,
@@ -50,6 +50,12 @@ pub(super) struct Kept {
     /// Mode, what samples there were, and towards which flank the last motion went; a whole word, of which every bit
     /// means something or is zero.
     pub marks: u32,
+    /// Way of the generator in the last tick, and how much it was longer than that in the tick before, counts: of
+    /// samples that were believed ([`IN_A_ROW`]).
+    pub step: i32,
+    pub bend: i32,
+    /// Bounds of the play as if the last sample had not moved it.
+    pub free: [i32; 2],
 }
 
 /// Bits of the marks: mode.
@@ -64,6 +70,15 @@ pub(super) const FLANK_FORWARD: u32 = 1 << 4;
 pub(super) const FLANK_BACKWARD: u32 = 2 << 4;
 /// The state was mended since the last tick, which the next has to report.
 pub(super) const MENDED: u32 = 1 << 6;
+/// Bits by definition: ticks in a row whose samples were believed, up to three. From two on there is a step, from three
+/// on a bend.
+pub(super) const IN_A_ROW: u32 = 3 << 7;
+/// The flank before the last sample, as that of the last motion.
+pub(super) const FLANK_BEFORE: u32 = FLANK << FLANK_SHIFT;
+/// To those bits, by definition.
+pub(super) const FLANK_SHIFT: u32 = 5;
+/// In the upper half, by definition: ticks since the last sample that was believed.
+pub(super) const UNSEEN_SHIFT: u32 = 16;
 
 impl Kept {
     /// After a reset: no correction, the side of the play unknown, off.
@@ -78,11 +93,15 @@ impl Kept {
         uncorrected: 0,
         fading: 0,
         marks: Mode::Off.code(),
+        step: 0,
+        bend: 0,
+        free: [0; 2],
     };
 
     #[inline(never)]
     const fn sums(&self) -> u64 {
         let (nominal, [error, lower, upper, half]) = self.play.parts();
+        let [free_lower, free_upper] = self.free;
         sums!(
             SUMS_START;
             low(nominal),
@@ -100,6 +119,10 @@ impl Kept {
             self.glitches as u32 | (self.uncorrected as u32) << 16,
             self.fading,
             self.marks,
+            self.step as u32,
+            self.bend as u32,
+            free_lower as u32,
+            free_upper as u32,
         )
     }
 
@@ -117,6 +140,12 @@ impl Kept {
     #[inline(always)]
     pub(super) const fn seen(&self) -> u32 {
         self.marks & SEEN
+    }
+
+    /// Ticks since the last sample that was believed, up to 65 535.
+    #[inline(always)]
+    pub(super) const fn unseen(&self) -> u32 {
+        self.marks >> UNSEEN_SHIFT
     }
 }
 
@@ -418,4 +447,7 @@ crate::upset::upsets!(Kept {
     uncorrected,
     fading,
     marks,
+    step,
+    bend,
+    free,
 });

@@ -95,7 +95,7 @@ impl Damaged {
 /// Two copies of a table at the temperature of the drive: 8.1 KiB, and 0.3 KiB beside.
 ///
 /// Joints of one table and temperature share a store: their ticks borrow it one after another, the slow group runs once
-/// for all. Each then takes a [`JointState`](crate::JointState) of 152 bytes, and its settings where they are not a
+/// for all. Each then takes a [`JointState`](crate::JointState) of 184 bytes, and its settings where they are not a
 /// constant.
 #[derive(Clone, Debug)]
 pub struct Store {

@@ -98,6 +98,8 @@ pub(crate) struct Estimate {
     pub output: OutputAngle,
     pub error: i32,
     pub uncertainty: i32,
+    /// Bounds of the play as no flank had moved it ([`PlayState::take_back`]).
+    pub free: [i32; 2],
     pub sane: bool,
     pub doubt: Doubt,
 }
@@ -128,10 +130,11 @@ impl<M: Memory> TableModel<'_, M> {
         let play = read::play_at(self.memory, point, phases, &mut doubt);
         let sane = point.finite & play.sane & doubt.none();
         let mask = (sane as i32).wrapping_neg();
-        let error = state.update(nominal, play.centre, play.half, sane) & mask;
+        let (error, free) = state.follow(nominal, play.centre, play.half, sane);
+        let error = error & mask;
         let limit = self.memory.plan().limit;
         let uncertainty = limit ^ (limit ^ state.uncertainty_counts().wrapping_add(point.jump)) & mask;
-        Estimate { nominal, output: nominal.offset_counts(error as i64), error, uncertainty, sane, doubt }
+        Estimate { nominal, output: nominal.offset_counts(error as i64), error, uncertainty, free, sane, doubt }
     }
 
     /// Command that brings the output to `target`.
