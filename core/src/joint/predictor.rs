@@ -518,7 +518,8 @@ impl Predictor {
             return unknown;
         };
         let measured_sound = now.measured.is_none() || now.measured_bound_rad.is_finite();
-        if !(ahead.bound_rad.is_finite() && ahead.motor_bound_rad.is_finite() && measured_sound) {
+        let sound = measured_sound && !joint.is_lost();
+        if !(ahead.bound_rad.is_finite() && ahead.motor_bound_rad.is_finite() && sound) {
             return unknown;
         }
         let to_generator = |motor_rad: f32| {

@@ -70,6 +70,11 @@ struct JointSettings {
     rate: i32,
     acceleration: i32,
     largest_move: i32,
+    /// A sample whose way differs by more from that of the one before is a glitch; one that takes back more than the
+    /// other is held against the one before. Counts.
+    largest_bend: i32,
+    spike: i32,
+    tick_s: f32,
     patience: u16,
     /// Ticks of a fade, and the part of the correction that one tick of it takes.
     fade: u16,
@@ -99,11 +104,35 @@ impl Joint {
         }
     }
 
-    /// The drive.
+    /// With a largest acceleration of the generator, rad/s²: a sample that would need more is a glitch, and one that is
+    /// out and back within two ticks is taken back. A multiple of what motor and load can do; no less than `hold_rad`
+    /// allows for noise.
+    ///
+    /// Without it a sample may need full speed in one tick, and one that is out and back a 64th of that in each.
+    ///
+    /// # Errors
+    /// [`SettingError`] if it is not finite, or below 1.5e-9 rad in a tick more each tick; or if the joint is lost.
+    pub const fn with_generator_acceleration(self, rad_s2: f32) -> Result<Self, SettingError> {
+        let Some(settings) = self.sound() else { return Err(SettingError { name: "joint", found: f32::NAN }) };
+        let tick = settings.tick_s as f64;
+        let per_tick = num::counts(rad_s2 as f64 * tick * tick);
+        let bend = match checked("generator_acceleration_rad_s2", rad_s2, per_tick, [1.0, f64::MAX]) {
+            Ok(counts) => counts as i32,
+            Err(error) => return Err(error),
+        };
+        // From full speed to full speed back is all that samples within the largest move can do.
+        let bend = within(bend, settings.noise(), settings.largest_move.saturating_mul(2));
+        let settings = JointSettings { largest_bend: bend, spike: bend, ..*settings }.sealed();
+        Ok(Self { copies: [settings; 2] })
+    }
+
+    /// The drive; one tooth and one wave, of which no table is, where the settings are lost.
     #[must_use]
     pub const fn drive(&self) -> &Drive {
-        let [first, _] = &self.copies;
-        &first.drive
+        match self.sound() {
+            Some(settings) => &settings.drive,
+            None => &Drive::SMALLEST,
+        }
     }
 
     /// Sums over the settings: they distinguish this joint from others in saved data.
@@ -112,13 +141,20 @@ impl Joint {
     }
 
     /// The settings that are whole.
-    fn sound(&self) -> Option<&JointSettings> {
-        self.copies.iter().find(|settings| settings.is_whole())
+    const fn sound(&self) -> Option<&JointSettings> {
+        let [first, second] = &self.copies;
+        if first.is_whole() {
+            Some(first)
+        } else if second.is_whole() {
+            Some(second)
+        } else {
+            None
+        }
     }
 
     /// Whether the settings are lost: neither copy is whole, and it has to be made anew.
     #[must_use]
-    pub fn is_lost(&self) -> bool {
+    pub const fn is_lost(&self) -> bool {
         self.sound().is_none()
     }
 
@@ -131,7 +167,7 @@ impl Joint {
     }
 
     /// Output angle for a generator angle, with the play followed in `play`: as [`crate::Table::forward`], from the
-    /// copies.
+    /// copies. Disabled, as [`Self::inverse`], where the settings are lost or the table is for another drive.
     #[must_use]
     pub fn forward(
         &self,
@@ -156,8 +192,8 @@ impl Joint {
     /// readings are, if no more than `patience` in a row were wrong and the generator made less than a third of what
     /// the register counts meanwhile.
     ///
-    /// `None`, and nothing has changed: the register cannot read that; joint, state or encoder are lost; or
-    /// `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion hides a wrong bit.
+    /// `None`: the register cannot read that; joint or encoder are lost; or `generator_rate_rad_s` allows a sixth of
+    /// what the register counts in a tick, so that motion hides a wrong bit.
     #[must_use]
     pub fn read(
         &self,
@@ -167,7 +203,7 @@ impl Joint {
         reading: u64,
     ) -> Option<GeneratorAngle> {
         let (now, _) = state.open();
-        let believed = (now.seen() == SAMPLED).then(|| now.generator.counts());
+        let believed = (now.seen() == SAMPLED).then(|| (now.generator.counts(), now.unseen().saturating_add(1)));
         let counts = encoder.read_near(at, reading, believed, self.sound()?.largest_move);
         counts.map(GeneratorAngle::from_counts)
     }

@@ -97,6 +97,8 @@ impl Kept {
         bend: 0,
         free: [0; 2],
     };
+    /// Neither copy is whole.
+    const LOST: Self = Self { marks: Mode::Safe.code(), ..Self::NEW };
 
     #[inline(never)]
     const fn sums(&self) -> u64 {
@@ -269,8 +271,7 @@ impl JointState {
         let (one, other) = (first.kept.correction, second.kept.correction);
         // What both have is likely to be what is commanded, and taken back within the limits.
         let correction = if one == other && one.unsigned_abs() <= MOST_FINE { one } else { 0 };
-        let marks = Mode::Safe.code();
-        *kept = Kept { correction, goal: correction, marks, ..Kept::NEW };
+        *kept = Kept { correction, goal: correction, ..Kept::LOST };
         CopyStatus::Lost
     }
 
@@ -285,13 +286,19 @@ impl JointState {
         second.sums = sums;
     }
 
-    /// The first copy, for a look: as the last tick left it.
+    /// The copy that is whole, for a look: as the last tick left it.
     const fn kept(&self) -> &Kept {
-        let [first, _] = &self.copies;
-        &first.kept
+        let [first, second] = &self.copies;
+        if first.is_whole() {
+            &first.kept
+        } else if second.is_whole() {
+            &second.kept
+        } else {
+            &Kept::LOST
+        }
     }
 
-    /// The mode.
+    /// The mode; safe where the state is lost.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         self.kept().mode()
@@ -307,9 +314,8 @@ impl JointState {
         if !from.may_become(to) {
             return Err(ModeError { from, to });
         }
-        let mended = if found == CopyStatus::Whole { 0 } else { MENDED };
-        kept.marks = kept.marks & !MODE | to.code() | mended;
-        self.close(&kept);
+        kept.marks = kept.marks & !MODE | to.code();
+        self.keep(kept, found);
         Ok(())
     }
 
@@ -317,12 +323,17 @@ impl JointState {
     pub fn forget_side(&mut self) {
         let (mut kept, found) = self.open();
         kept.play = PlayState::unknown();
-        let mended = if found == CopyStatus::Whole { 0 } else { MENDED };
-        kept.marks = kept.marks & !FLANK | mended;
+        kept.marks &= !(FLANK | IN_A_ROW);
+        self.keep(kept, found);
+    }
+
+    /// Keeps it between two ticks: what was found not to be whole the next one has to report.
+    fn keep(&mut self, mut kept: Kept, found: CopyStatus) {
+        kept.marks |= if found == CopyStatus::Whole { 0 } else { MENDED };
         self.close(&kept);
     }
 
-    /// The play.
+    /// The play; unknown where the state is lost.
     #[must_use]
     pub const fn play(&self) -> &PlayState {
         &self.kept().play
