@@ -37,7 +37,7 @@
 use super::limits::{SettingError, checked};
 use super::runtime::Joint;
 use crate::angle::{GeneratorAngle, OutputAngle};
-use crate::drive::Drive;
+use crate::whole::{Sealed, words};
 
 /// How far the motor moves, and what is expected of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,37 +126,58 @@ pub struct StartUpStep {
     pub found: Option<Implausible>,
 }
 
-/// Readings at the end of a move.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct MoveEnd {
-    generator: Option<GeneratorAngle>,
-    output: Option<OutputAngle>,
-    torque_n_m: Option<f32>,
-}
-
-/// A test of the sensors under way.
+/// A test of the sensors under way, under a sum ([`whole`](../../whole.rs)): an upset of one word is mended in the next
+/// step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartUp {
-    drive: Drive,
-    from: GeneratorAngle,
-    way: i64,
-    ticks: u16,
-    output_error: i64,
-    drag_n_m: f32,
-    tick: u32,
-    /// At the start, at the end of the way there, and of that back.
-    places: [MoveEnd; 3],
-    /// Sum of the torques in the moving half of the way, and how many.
-    torque: (f32, u16),
-    lost: bool,
+    test: Sealed<SensorTest>,
 }
 
-/// An encoder's way may differ from the commanded one by this share: a servo's lag, not a unit. A guess.
-const WAY_SHARE: i64 = 10;
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SensorTest {
+    /// Where the generator begins, its way there, and the way of the output that belongs to it, counts.
+    from: i64,
+    way: i64,
+    output_way: i64,
+    output_error: i64,
+    drag_n_m: f32,
+    ticks: u32,
+    tick: u32,
+    /// At the start, at the end of the way there, and of that back.
+    generator: [i64; 3],
+    output: [i64; 3],
+    torque_n_m: [f32; 3],
+    /// Sum of the torques in the moving half of the way, and their number.
+    torque_sum: f32,
+    torques: u32,
+    /// Which sensors there are ([`present`]), and [`LOST`].
+    marks: u32,
+}
+words!([] SensorTest {
+    from, way, output_way, output_error, drag_n_m, ticks, tick, generator, output, torque_n_m, torque_sum, torques,
+    marks,
+});
+
+/// A bit of the marks of a test, by definition: there is an encoder of the generator.
+const GENERATOR: u32 = 1;
+/// By definition: there is one at the output.
+const OUTPUT: u32 = 2;
+/// By definition: there is a torque.
+const TORQUE: u32 = 4;
+/// By definition: a sensor came or went, or said what is no number.
+const LOST: u32 = 8;
+
+const fn present(readings: &Readings) -> u32 {
+    let generator = if readings.generator.is_some() { GENERATOR } else { 0 };
+    let output = if readings.output.is_some() { OUTPUT } else { 0 };
+    generator | output | if readings.torque_n_m.is_some() { TORQUE } else { 0 }
+}
+
+/// A way may differ from the expected one by a hundredth: the lag that a servo has left, not a unit or the counts in a
+/// turn (4000 for 4096 is 2.3 hundredths). A guess.
+const WAY_SHARE: u64 = 100;
 /// A way below 2⁻⁸ of the expected one is none: noise of a sensor that stands. A guess.
 const STILL_SHIFT: u32 = 8;
-/// Of the output's, beside the error that is stated: a hundredth.
-const RATIO_SHARE: i64 = 100;
 /// The torque turns over by this part of what the drag says, and by these factors, at least and at most; below a tenth
 /// it does not change. Drag differs from unit to unit and with the temperature by two or three times
 /// ([motion.md](https://docs.rs/crate/flexspline)); the nearest unit is 8.9 times off (N·m and lbf·in).
@@ -171,60 +192,70 @@ impl StartUp {
     /// output, too few ticks, a drag of 0.
     pub fn new(joint: &Joint, from: GeneratorAngle, settings: &StartUpSettings) -> Result<Self, SettingError> {
         let StartUpSettings { way_rad, ticks, output_error_rad, drag_n_m } = *settings;
+        let drive = joint.drive();
         let error = checked("output_error_rad", output_error_rad, output_error_rad as f64, [1e-7, 0.1])?;
         let least = 10.0 * error as f64;
-        let at_output = way_rad as f64 / joint.drive().exact_ratio();
+        let at_output = way_rad as f64 / drive.exact_ratio();
         checked("way_rad", way_rad, at_output.abs(), [least, core::f64::consts::PI])?;
         checked("ticks", ticks as f32, ticks as f64, [8.0, 65_535.0])?;
         checked("drag_n_m", drag_n_m, drag_n_m as f64, [1e-6, 1e9])?;
         let counts = |rad: f64| crate::num::counts(rad) as i64;
-        Ok(Self {
-            drive: *joint.drive(),
-            from,
-            way: counts(way_rad as f64),
-            ticks,
+        let way = counts(way_rad as f64);
+        let test = SensorTest {
+            from: from.counts(),
+            way,
+            output_way: drive.nominal_output(GeneratorAngle::from_counts(way)).counts(),
             output_error: counts(output_error_rad as f64),
             drag_n_m,
+            ticks: ticks as u32,
             tick: 0,
-            places: [MoveEnd::default(); 3],
-            torque: (0.0, 0),
-            lost: false,
-        })
+            generator: [0; 3],
+            output: [0; 3],
+            torque_n_m: [0.0; 3],
+            torque_sum: 0.0,
+            torques: 0,
+            marks: 0,
+        };
+        Ok(Self { test: Sealed::new(test) })
     }
 
-    /// One tick: what the sensors say, with the command of the tick before; what to command now.
+    /// One tick: what the sensors say, with the command of the tick before; what to command now. Where an upset hit
+    /// more than can be mended the generator stays where it is read, and the test ends with [`Implausible::LOST`].
     #[must_use]
     pub fn step(&mut self, readings: &Readings) -> StartUpStep {
-        let Self { from, way, ticks, tick, .. } = *self;
-        let ticks = ticks as u32;
+        let command = readings.generator.unwrap_or_default();
+        let lost = StartUpStep { command, found: Some(Implausible::LOST) };
+        self.test.change(|test| test.step(readings)).unwrap_or(lost)
+    }
+}
+
+impl SensorTest {
+    fn step(&mut self, readings: &Readings) -> StartUpStep {
+        let Self { way, ticks, tick, .. } = *self;
         let moving = ticks >> 1;
         let (leg, within) = if tick < ticks { (0u8, tick) } else { (1, tick.wrapping_sub(ticks)) };
-        let finite = readings.torque_n_m.is_none_or(f32::is_finite);
-        let MoveEnd { generator, output, torque_n_m } = self.places.first().copied().unwrap_or_default();
-        let same = generator.is_some() == readings.generator.is_some()
-            && output.is_some() == readings.output.is_some()
-            && torque_n_m.is_some() == readings.torque_n_m.is_some();
         if tick == 0 {
+            self.marks = present(readings);
             self.place(0, readings);
         }
-        self.lost |= !finite || (tick > 0 && !same);
+        let torque_n_m = readings.torque_n_m.unwrap_or(0.0);
+        let same = present(readings) == self.marks & !LOST && torque_n_m.is_finite();
+        self.marks |= if same { 0 } else { LOST };
         // Where it moves, but for its beginning and its end.
         if within > moving >> 2 && within < moving {
-            let (sum, number) = self.torque;
-            self.torque = (sum + readings.torque_n_m.unwrap_or(0.0), number.saturating_add(1));
+            self.torque_sum += torque_n_m;
+            self.torques = self.torques.saturating_add(1);
         }
-        if within == moving
-            && let (sum, Some(number)) = (self.torque.0, core::num::NonZeroU16::new(self.torque.1))
-        {
-            let place = if leg == 0 { 1 } else { 2 };
-            if let Some(place) = self.places.get_mut(place) {
-                place.torque_n_m = readings.torque_n_m.map(|_| sum / number.get() as f32);
+        let place = if leg == 0 { 1 } else { 2 };
+        if within == moving {
+            if let Some(mean) = self.torque_n_m.get_mut(place) {
+                *mean = self.torque_sum / self.torques as f32;
             }
-            self.torque = (0.0, 0);
+            (self.torque_sum, self.torques) = (0.0, 0);
         }
         let last = within.wrapping_add(1) >= ticks;
         if last {
-            self.place(if leg == 0 { 1 } else { 2 }, readings);
+            self.place(place, readings);
         }
         self.tick = tick.saturating_add(1);
         let share = |within: u32| {
@@ -233,43 +264,41 @@ impl StartUp {
         };
         let along = if leg == 0 { share(within) } else { way.wrapping_sub(share(within)) };
         let done = last && leg == 1;
-        StartUpStep { command: from.offset_counts(if done { 0 } else { along }), found: done.then(|| self.judge()) }
+        let command = self.from.wrapping_add(if done { 0 } else { along });
+        StartUpStep { command: GeneratorAngle::from_counts(command), found: done.then(|| self.judge()) }
     }
 
     fn place(&mut self, number: usize, readings: &Readings) {
-        if let Some(place) = self.places.get_mut(number) {
-            place.generator = readings.generator;
-            place.output = readings.output;
-            if number == 0 {
-                place.torque_n_m = readings.torque_n_m;
-            }
+        let places = self.generator.get_mut(number).zip(self.output.get_mut(number));
+        if let Some((generator, output)) = places {
+            *generator = readings.generator.unwrap_or_default().counts();
+            *output = readings.output.unwrap_or_default().counts();
         }
     }
 
     fn judge(&self) -> Implausible {
-        let [start, there, back] = self.places;
-        let mut found = Implausible::default().with(Implausible::LOST, self.lost);
-        for (one, other, way) in [(start, there, self.way), (there, back, self.way.wrapping_neg())] {
-            let moved = one.generator.zip(other.generator).map(|(one, other)| other.minus_counts(one));
-            let faults = [Implausible::GENERATOR_STILL, Implausible::GENERATOR_SIGN, Implausible::GENERATOR_RATIO];
-            let share = way.unsigned_abs().checked_div(WAY_SHARE as u64).unwrap_or(0);
-            found = match moved {
-                None => found.with(Implausible::GENERATOR_LOST, true),
-                Some(moved) => differs(found, moved, way, share, faults),
-            };
-            let nominal = self.drive.nominal_output(GeneratorAngle::from_counts(way)).counts();
-            if let Some((one, other)) = one.output.zip(other.output) {
-                let faults = [Implausible::OUTPUT_STILL, Implausible::OUTPUT_SIGN, Implausible::OUTPUT_RATIO];
-                let allowed = self.output_error.unsigned_abs();
-                let allowed =
-                    allowed.saturating_add(nominal.unsigned_abs().checked_div(RATIO_SHARE as u64).unwrap_or(0));
-                found = differs(found, other.minus_counts(one), nominal, allowed, faults);
+        let has = |sensor: u32| self.marks & sensor != 0;
+        let mut found = Implausible::default()
+            .with(Implausible::LOST, has(LOST))
+            .with(Implausible::GENERATOR_LOST, !has(GENERATOR));
+        let generator = [Implausible::GENERATOR_STILL, Implausible::GENERATOR_SIGN, Implausible::GENERATOR_RATIO];
+        let output = [Implausible::OUTPUT_STILL, Implausible::OUTPUT_SIGN, Implausible::OUTPUT_RATIO];
+        for (sensor, places, way, error, faults) in [
+            (GENERATOR, self.generator, self.way, 0, generator),
+            (OUTPUT, self.output, self.output_way, self.output_error, output),
+        ] {
+            let [start, there, back] = places;
+            let share = way.unsigned_abs().checked_div(WAY_SHARE).unwrap_or(0);
+            for (moved, way) in [(there.wrapping_sub(start), way), (back.wrapping_sub(there), way.wrapping_neg())] {
+                if has(sensor) {
+                    found = differs(found, moved, way, share.saturating_add(error.unsigned_abs()), faults);
+                }
             }
         }
-        if let Some((there_n_m, back_n_m)) = there.torque_n_m.zip(back.torque_n_m) {
+        if has(TORQUE) {
             // Forward the mesh carries the load less the drag, backward the load and the drag.
-            let forward = self.drive.nominal_output(GeneratorAngle::from_counts(self.way)).counts() > 0;
-            let turned = if forward { back_n_m - there_n_m } else { there_n_m - back_n_m };
+            let [_, there_n_m, back_n_m] = self.torque_n_m;
+            let turned = if self.output_way > 0 { back_n_m - there_n_m } else { there_n_m - back_n_m };
             let part = turned / (2.0 * self.drag_n_m);
             let size = part.abs();
             let (still, wrong_way) = (size.is_nan() || size < DRAG_STILL, part < 0.0);
@@ -304,10 +333,30 @@ fn differs(
 }
 
 #[cfg(test)]
+crate::upset::upsets!(StartUp { test });
+#[cfg(test)]
+crate::upset::upsets!(SensorTest {
+    from,
+    way,
+    output_way,
+    output_error,
+    drag_n_m,
+    ticks,
+    tick,
+    generator,
+    output,
+    torque_n_m,
+    torque_sum,
+    torques,
+    marks
+});
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::joint::{Limits, Overrun};
-    use crate::{Degrees, FixedMember};
+    use crate::upset::Upset;
+    use crate::{Degrees, Drive, FixedMember};
 
     const SETTINGS: StartUpSettings =
         StartUpSettings { way_rad: Degrees(1080.0).rad(), ticks: 400, output_error_rad: 1e-3, drag_n_m: 1.5 };
@@ -347,7 +396,7 @@ mod tests {
             let step = test.step(&readings);
             command = step.command;
             assert_eq!(step.found.is_some(), tick == 799, "{tick}");
-            assert!(command.minus_counts(from).unsigned_abs() <= test.way.unsigned_abs());
+            assert!(command.minus_counts(from).unsigned_abs() <= test.test.kept().way.unsigned_abs());
             if let Some(found) = step.found {
                 assert_eq!(command, from);
                 return found;
@@ -377,7 +426,8 @@ mod tests {
                 let of_generator = |by: f64| tested(fixed, way, generator(by), |_| None, |_| None);
                 assert_eq!(of_generator(-1.0), Implausible::GENERATOR_SIGN);
                 // Degrees for radians and the other way, lines for counts, the output's encoder for the generator's.
-                for by in [57.3, 1.0 / 57.3, 4.0, 0.25, 0.5, 95.0] {
+                // Counts in a turn that are nearly right.
+                for by in [57.3, 1.0 / 57.3, 4.0, 0.25, 0.5, 95.0, 4000.0 / 4096.0, 4096.0 / 4000.0, 0.96, 1.04] {
                     assert_eq!(of_generator(by), Implausible::GENERATOR_RATIO, "{by}");
                 }
                 assert_eq!(of_generator(0.0), Implausible::GENERATOR_STILL);
@@ -397,6 +447,30 @@ mod tests {
                 assert_eq!(of_torque(0.0), Implausible::TORQUE_STILL);
                 assert!(tested(fixed, way, Some, Some, |_| Some(f32::NAN)).contains(Implausible::LOST));
             }
+        }
+    }
+
+    /// Every bit before every fifth tick: the same commands and findings as without; two words: the test ends, and
+    /// commands nothing.
+    #[test]
+    fn an_upset_of_the_test_is_mended_or_ends_it() {
+        let settings = StartUpSettings { ticks: 10, ..SETTINGS };
+        let mut test = StartUp::new(&joint(FixedMember::Flexspline), GeneratorAngle::ZERO, &settings).unwrap();
+        let mut at = GeneratorAngle::ZERO;
+        for tick in 0..20 {
+            let readings = Readings { generator: Some(at), output: None, torque_n_m: Some(tick as f32) };
+            let sound = test;
+            let step = test.step(&readings);
+            for bit in (0..sound.bits()).filter(|_| tick % 5 == 3) {
+                let mut hit = sound;
+                hit.flip(bit, &mut std::string::String::new());
+                assert_eq!((hit.step(&readings), hit), (step, test), "{bit}");
+                hit = sound;
+                hit.flip(bit, &mut std::string::String::new());
+                hit.flip((bit + 300) % sound.bits(), &mut std::string::String::new());
+                assert_eq!(hit.step(&readings), StartUpStep { command: at, found: Some(Implausible::LOST) }, "{bit}");
+            }
+            at = step.command;
         }
     }
 
