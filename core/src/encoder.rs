@@ -91,7 +91,6 @@ struct At {
 
 impl EncoderState {
     /// Nowhere: it is not whole.
-    #[cfg(any(test, feature = "c-api"))]
     pub(crate) const NOWHERE: Self = Self { at: Sealed::of([0; 4], 0) };
 
     fn of(At { reading, since_zero }: At) -> Self {
@@ -181,27 +180,33 @@ impl Encoder {
         next.is_some()
     }
 
-    /// As [`Self::read`], from the reading before or from the angle that was believed last, whichever is nearer, where
-    /// three moves of a tick are less than half of what the register counts: then one wrong reading that is not
-    /// believed moves no turn. The angle; `None`, and nothing has changed, as above.
+    /// As [`Self::read`] while a reading is no further from the one before than a tick allows. Else from the angle that
+    /// was believed last, that number of ticks ago, while the generator cannot have made half of what the register
+    /// counts since, nor in two ticks more: by those that angle may be off where it was a wrong one within the largest
+    /// move. The angle; `None` as above, and where three moves of a tick are half of what the register counts; and the
+    /// state is lost where nothing says which turn it is.
     pub(crate) fn read_near(
         &self,
         state: &mut EncoderState,
         reading: u64,
-        believed: Option<i64>,
+        believed: Option<(i64, u32)>,
         largest_move: i32,
     ) -> Option<i64> {
-        let settings = self.settings().filter(|settings| settings.tells_turns(largest_move))?;
+        let settings = self.settings().filter(|settings| settings.half_is_more_than(largest_move, 3))?;
         let at = state.open()?;
-        let last = (settings.way(at.reading, reading)?, at.since_zero);
-        let from = |believed| {
-            let since_zero = settings.since_zero(believed);
-            let way = settings.way(settings.register(since_zero.wrapping_add(settings.zero_counts)), reading);
-            way.map(|way| (way, since_zero))
+        let way = settings.way(at.reading, reading)?;
+        let since_zero = match believed {
+            Some((angle, ticks)) if way.unsigned_abs() > settings.counts_of(largest_move) => {
+                if !settings.half_is_more_than(largest_move, ticks.saturating_add(2)) {
+                    *state = EncoderState::NOWHERE;
+                    return None;
+                }
+                let from = settings.since_zero(angle);
+                let way = settings.way(settings.register(from.wrapping_add(settings.zero_counts)), reading)?;
+                from.wrapping_add(way)
+            }
+            _ => at.since_zero.wrapping_add(way),
         };
-        let nearer = believed.and_then(from).filter(|(way, _)| way.unsigned_abs() < last.0.unsigned_abs());
-        let (way, from) = nearer.unwrap_or(last);
-        let since_zero = from.wrapping_add(way);
         *state = EncoderState::of(At { reading, since_zero });
         Some(settings.angle(since_zero))
     }
@@ -264,14 +269,18 @@ impl EncoderSettings {
         }
     }
 
-    /// Whether three such moves, 2⁻³² turn, are less than half of what the register counts.
-    const fn tells_turns(&self, largest_move: i32) -> bool {
-        let counts = ((largest_move as u64).wrapping_mul(self.counts_per_turn as u64) >> 32).wrapping_add(1);
+    /// A move, 2⁻³² turn, in counts, rounded up.
+    const fn counts_of(&self, largest_move: i32) -> u64 {
+        ((largest_move as u64).wrapping_mul(self.counts_per_turn as u64) >> 32).wrapping_add(1)
+    }
+
+    /// Whether that number of such moves is less than half of what the register counts.
+    const fn half_is_more_than(&self, largest_move: i32, number: u32) -> bool {
         let most = match self.wrap {
             EncoderWrap::Turn => self.counts_per_turn as u64,
             EncoderWrap::Bits(bits) => mask(bits),
         };
-        counts.wrapping_mul(6) < most
+        self.counts_of(largest_move).wrapping_mul(2 * number as u64) < most
     }
 
     /// The shorter way from a reading to another; `None` if the register cannot read the other.

@@ -86,13 +86,15 @@ pub extern "C" fn flexspline_encoder_start(
 }
 
 /// Takes a reading of the encoder of a joint's generator and reports the angle to give to its next tick, counts of
-/// 2^-32 turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the
-/// next is taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns
-/// are right as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less
-/// than a third of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that
-/// (give the tick no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick,
-/// so that motion hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where
-/// encoder or joint are lost.
+/// 2^-32 turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: one
+/// that is further from the one before than a tick allows is taken from the angle that was believed last, for N ticks;
+/// in N + 2 the generator cannot make half of what the register counts. So the turns are right as soon as the readings
+/// are, if no more than N - 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at
+/// 500 rad/s. After more the encoder is lost: give the tick no sample, and call `flexspline_encoder_start` with what is
+/// known otherwise. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no
+/// sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
+/// hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint
+/// are lost.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_read(
     joint: *const FlexsplineJoint,
@@ -109,7 +111,9 @@ pub extern "C" fn flexspline_joint_read(
         if !encoder.mend() || at.is_lost() || joint.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
-        let angle = joint.read(state, encoder, at, reading).ok_or(FlexsplineStatus::Argument)?;
+        let angle = joint.read(state, encoder, at, reading);
+        let refused = if at.is_lost() { FlexsplineStatus::NotInitialised } else { FlexsplineStatus::Argument };
+        let angle = angle.ok_or(refused)?;
         give(angle_counts, angle.counts())
     };
     status(read())

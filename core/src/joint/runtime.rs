@@ -176,21 +176,24 @@ impl Joint {
         generator: GeneratorAngle,
         torque_n_m: f32,
     ) -> Prediction {
-        self.model(store).follow(&store.locate_whole(torque_n_m), play, generator)
+        let (model, point) = self.at(store, torque_n_m);
+        model.follow(&point, play, generator)
     }
 
     /// Generator angle that brings the output to `target`: as [`crate::Table::inverse`], from the copies.
     #[must_use]
     pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
-        self.model(store).aim(&store.locate_whole(torque_n_m), target, approach)
+        let (model, point) = self.at(store, torque_n_m);
+        model.aim(&point, target, approach)
     }
 
     /// The generator angle of a reading of its encoder, to give to the next [`Self::tick`].
     ///
-    /// A reading that the tick does not believe ([`Flags::GLITCH`]) moves no turn: the next one is taken from the one
-    /// before or from the angle that was believed last, whichever is nearer. So the turns are right as soon as the
-    /// readings are, if no more than `patience` in a row were wrong and the generator made less than a third of what
-    /// the register counts meanwhile.
+    /// A reading that the tick does not believe ([`Flags::GLITCH`]) moves no turn: one that is further from the one
+    /// before than a tick allows is taken from the angle that was believed last, for N ticks; in N + 2 the generator
+    /// cannot make half of what the register counts. So the turns are right as soon as the readings are, if no more
+    /// than N − 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at 500 rad/s.
+    /// After more the encoder is lost ([`EncoderState::is_lost`]): start it anew from what is known otherwise.
     ///
     /// `None`: the register cannot read that; joint or encoder are lost; or `generator_rate_rad_s` allows a sixth of
     /// what the register counts in a tick, so that motion hides a wrong bit.

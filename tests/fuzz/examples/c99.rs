@@ -28,6 +28,29 @@ struct Vectors<W> {
     refused: std::collections::BTreeMap<u8, u64>,
 }
 
+/// A reading as the reader in C99 takes it: from the reading before, or from the angle that was believed last,
+/// whichever is nearer.
+fn read_nearer(
+    joint: &Joint,
+    believed: Option<i64>,
+    encoder: &Encoder,
+    at: &mut EncoderState,
+    reading: u64,
+) -> Option<GeneratorAngle> {
+    let before = encoder.angle(at)?;
+    // A joint without a sample goes on from the reading before, where its limits allow that.
+    let way = joint.read(&JointState::new(), encoder, at, reading)?.counts().wrapping_sub(before);
+    if let Some(believed) = believed {
+        let [from, to] = [encoder.reading(believed), reading].map(|reading| encoder.start(reading, believed));
+        let (from, to) = (from?, to?);
+        let nearer = encoder.angle(&to)?.wrapping_sub(encoder.angle(&from)?);
+        if nearer.unsigned_abs() < way.unsigned_abs() {
+            *at = to;
+        }
+    }
+    encoder.angle(at).map(GeneratorAngle::from_counts)
+}
+
 /// One count, rad.
 const COUNT_RAD: f64 = std::f64::consts::TAU / 4_294_967_296.0;
 
@@ -321,6 +344,8 @@ impl<W: Write> Vectors<W> {
         let overrun = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks }];
         let overrun = overrun[code.min(2) as usize];
         let made = Joint::new(*table.drive(), limits, overrun);
+        // Which the reader in C99 does not limit.
+        let made = made.map(|joint| joint.with_generator_acceleration(1e30).expect("more than any generator's"));
         let names = ["tick_s", "rate_rad_s", "acceleration_rad_s2", "generator_rate_rad_s", "hold_rad"];
         let refused = made.as_ref().err().map(|error| names.iter().position(|&name| name == error.name));
         self.out.write_all(&[4])?;
@@ -347,7 +372,7 @@ impl<W: Write> Vectors<W> {
         let (mut torque, mut target, mut speed) = (0.0, mixed.number() as i64 >> 20, 0i64);
         let mut generator = table.drive().nominal_generator(OutputAngle::from_counts(target)).counts();
         let encoder = self.settings(mixed)?;
-        let mut at = None;
+        let (mut at, mut believed) = (None, None);
         for tick in 0..ticks {
             let number = mixed.number();
             if tick == 0 || number.is_multiple_of(64) {
@@ -388,6 +413,9 @@ impl<W: Write> Vectors<W> {
                 adjustment: Adjustment::default(),
             };
             let found = joint.tick(images, store, &mut state, &input);
+            if !found.flags.contains(Flags::SAMPLE_LOST) && !found.flags.contains(Flags::GLITCH) {
+                believed = Some(sample);
+            }
             let told = [
                 Flags::SAMPLE_LOST,
                 Flags::GLITCH,
@@ -421,7 +449,7 @@ impl<W: Write> Vectors<W> {
             let reading = encoder.reading(generator) ^ wrong;
             let started = at.or_else(|| encoder.start(reading, 0));
             let mut now = started;
-            let read = now.as_mut().and_then(|now| joint.read(&state, encoder, now, reading));
+            let read = now.as_mut().and_then(|now| read_nearer(joint, believed, encoder, now, reading));
             // Without a start a reading that is not taken begins nothing.
             at = read.and(now).or(at);
             self.out.write_all(&[8])?;
@@ -484,7 +512,7 @@ impl<W: Write> Vectors<W> {
                         None => false,
                     };
                     state = now.or(state);
-                    (reading, taken, state.filter(|_| taken).map_or(0, |state| encoder.angle_counts(&state)))
+                    (reading, taken, state.filter(|_| taken).map_or(0, |state| encoder.angle(&state).unwrap_or(0)))
                 }
                 _ => (at as u64, true, encoder.reading(at) as i64),
             };
