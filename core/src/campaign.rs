@@ -101,7 +101,7 @@ struct Raw {
 }
 
 impl Feed {
-    fn new() -> Self {
+    fn new(joint: &Joint, store: &Store) -> Self {
         let encoder = Encoder::new(EncoderSettings {
             counts_per_turn: 1 << 20,
             wrap: EncoderWrap::Bits(32),
@@ -122,7 +122,7 @@ impl Feed {
         let spring = |width_rad, gain| SlipElement { width_rad, gain };
         let torque_spring = |width_n_m, gain_rad_per_n_m| TorqueSlipElement { width_n_m, gain_rad_per_n_m };
         let coefficient = |term, limit| Coefficient { term, limit, initial_std: 0.5 * limit };
-        let adapter = Adapter::new(&AdaptSettings {
+        let settings = AdaptSettings {
             coefficients: [
                 coefficient(Term::Mean, 2e-4),
                 coefficient(Term::HalfWidth, 5e-5),
@@ -133,8 +133,8 @@ impl Feed {
             gate: 5.0,
             settle_rad: 1e-5,
             torque_limit_n_m: 20.0,
-        })
-        .unwrap();
+        };
+        let adapter = Adapter::new(&settings, joint, store, 0).unwrap();
         let mut learnt = adapter.start();
         learnt.set_learning(Learning::On);
         let inertias =
@@ -161,7 +161,7 @@ impl Feed {
     /// From the sensors to the input of a tick: of what the story gives it keeps target and late ticks.
     fn input(&mut self, raw: &Raw, story: Input) -> Input {
         let read = self.encoder.read(&mut self.at, raw.register);
-        let generator = read.then(|| GeneratorAngle::from_counts(self.encoder.angle_counts(&self.at)));
+        let generator = self.encoder.angle(&self.at).filter(|_| read).map(GeneratorAngle::from_counts);
         let _ = self.predictor.step(&mut self.observer, &raw.motor);
         let sensed = self.aged.tick(raw.torque_n_m);
         let torque = if raw.observed { self.observer.load_torque_n_m() } else { sensed };
@@ -193,7 +193,8 @@ impl World {
         store.activate(&images(), &fixture::drive(), 20.0).unwrap();
         let mut state = JointState::new();
         state.request(Mode::Tracking).unwrap();
-        Self { joint, store, state, feed: Feed::new() }
+        let feed = Feed::new(&joint, &store);
+        Self { joint, store, state, feed }
     }
 
     /// One tick, and what it was given.
@@ -755,23 +756,22 @@ fn springs_are_restored_only_where_they_belong() {
     let (bank, mut springs) = (feed.bank, feed.springs);
     let _ = bank.update(&mut springs, OutputAngle::ZERO);
     let mut saved = [0; crate::saved_slip_bytes(3)];
-    assert_eq!(bank.save_for(&springs, &joint, &store, &mut saved), Some(saved.len()));
-    assert_eq!(bank.restore_for(&joint, &store, &saved), Ok(springs));
-    assert_eq!(bank.restore(&saved), None);
+    assert_eq!(bank.save(&springs, &joint, &store, &mut saved), Some(saved.len()));
+    assert_eq!(bank.restore(&joint, &store, &saved), Ok(springs));
     let other = Joint::new(fixture::drive(), fixture::LIMITS, Overrun::SkipAndCount).unwrap();
-    assert_eq!(bank.restore_for(&other, &store, &saved), Err(OtherJoint));
+    assert_eq!(bank.restore(&other, &store, &saved), Err(OtherJoint));
     let images = [fixture::image(false), fixture::image(false)];
     let mut second = Store::new();
     second.activate(&Images::new(&images[0], &images[1]), &fixture::drive(), 20.0).unwrap();
-    assert_eq!(bank.restore_for(&joint, &second, &saved), Err(OtherTable));
+    assert_eq!(bank.restore(&joint, &second, &saved), Err(OtherTable));
     for bit in 0..8 * saved.len() {
         let mut damaged = saved;
         damaged[bit / 8] ^= 1 << (bit % 8);
         let expected = if bit < 32 { Version { found: *damaged.first_chunk().unwrap() } } else { Crc };
-        assert_eq!(bank.restore_for(&joint, &store, &damaged), Err(expected), "{bit}");
+        assert_eq!(bank.restore(&joint, &store, &damaged), Err(expected), "{bit}");
     }
-    bank.save(&springs, &mut saved).unwrap();
-    assert_eq!(bank.restore_for(&joint, &store, &saved), Err(OtherTable));
+    bank.save(&springs, &joint, &Store::new(), &mut saved).unwrap();
+    assert_eq!(bank.restore(&joint, &store, &saved), Err(OtherTable));
 }
 
 /// The order of a start: an encoder that is late by some ticks, after a reset and after a restore.

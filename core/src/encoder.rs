@@ -212,14 +212,7 @@ impl Encoder {
     }
 
     /// The angle, 2⁻³² turn, to the nearest: for [`GeneratorAngle::from_counts`](crate::GeneratorAngle::from_counts) or
-    /// [`OutputAngle::from_counts`](crate::OutputAngle::from_counts). 0 if settings or state are lost
-    /// ([`Self::angle`]).
-    #[must_use]
-    pub fn angle_counts(&self, state: &EncoderState) -> i64 {
-        self.angle(state).unwrap_or(0)
-    }
-
-    /// As [`Self::angle_counts`]; `None` if settings or state are lost.
+    /// [`OutputAngle::from_counts`](crate::OutputAngle::from_counts). `None` if settings or state are lost.
     #[must_use]
     pub fn angle(&self, state: &EncoderState) -> Option<i64> {
         let (settings, at) = (self.settings()?, state.open()?);
@@ -337,7 +330,7 @@ mod tests {
         {
             let encoder = made(EncoderSettings { reversed, zero_counts, wrap: EncoderWrap::Turn, ..SETTINGS });
             let state = encoder.start(reading, 0).unwrap();
-            assert_eq!(encoder.angle_counts(&state), quarters << 30, "{reversed} {zero_counts}");
+            assert_eq!(encoder.angle(&state).unwrap(), quarters << 30, "{reversed} {zero_counts}");
             assert_eq!(encoder.reading(quarters << 30), reading);
         }
     }
@@ -351,7 +344,7 @@ mod tests {
         for step in 0..3_000_000i64 {
             counted += 7919 + step % 13;
             assert!(encoder.read(&mut state, counted as u64 & 0xffff));
-            let angle = encoder.angle_counts(&state);
+            let angle = encoder.angle(&state).unwrap();
             assert!(angle > last);
             last = angle;
         }
@@ -362,7 +355,7 @@ mod tests {
             counted -= 7919;
             assert!(encoder.read(&mut state, counted as u64 & 0xffff));
         }
-        assert_eq!(i128::from(encoder.angle_counts(&state)), (((i128::from(counted) << 33) / 20_000) + 1) >> 1);
+        assert_eq!(i128::from(encoder.angle(&state).unwrap()), (((i128::from(counted) << 33) / 20_000) + 1) >> 1);
     }
 
     #[test]
@@ -374,9 +367,9 @@ mod tests {
             for moved in [-6_000, -1, 0, 1, 6_000] {
                 let there = near + (moved << 32) / 20_000;
                 let state = encoder.start(encoder.reading(there), near).unwrap();
-                assert!((encoder.angle_counts(&state) - there).abs() <= (1 << 31) / 20_000 + 1, "{wrap:?} {moved}");
+                assert!((encoder.angle(&state).unwrap() - there).abs() <= (1 << 31) / 20_000 + 1, "{wrap:?} {moved}");
             }
-            assert!(encoder.angle_counts(&encoder.start(0, 0).unwrap()).abs() < 8 << 32);
+            assert!(encoder.angle(&encoder.start(0, 0).unwrap()).unwrap().abs() < 8 << 32);
         }
     }
 
@@ -396,7 +389,7 @@ mod tests {
         assert_eq!(state, before);
         // Half of what it counts is backward, as the shorter way is not known.
         assert!(turn.read(&mut state, 9_999));
-        assert_eq!(turn.angle_counts(&state) - turn.angle_counts(&before), -1 << 31);
+        assert_eq!(turn.angle(&state).unwrap() - turn.angle(&before).unwrap(), -1 << 31);
     }
 
     proptest! {
@@ -411,7 +404,7 @@ mod tests {
             let settings = encoder.settings().unwrap();
             let at = At { reading: settings.register(counts), since_zero: counts };
             let state = EncoderState::of(at);
-            let angle = encoder.angle_counts(&state);
+            let angle = encoder.angle(&state).unwrap();
             prop_assert_eq!(settings.since_zero(angle), counts);
             prop_assert_eq!(encoder.reading(angle), at.reading);
             let sign = if reversed { -1 } else { 1 };
@@ -419,7 +412,7 @@ mod tests {
             prop_assert!((angle as f64 - exact).abs() <= 0.5 + 1e-15 * exact.abs());
             // A count more is more.
             let next = EncoderState::of(At { since_zero: counts + sign, ..at });
-            prop_assert!(encoder.angle_counts(&next) > angle);
+            prop_assert!(encoder.angle(&next).unwrap() > angle);
             prop_assert_eq!(encoder.start(at.reading, angle), Some(state));
         }
     }

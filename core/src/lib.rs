@@ -77,10 +77,18 @@
 //!
 //! let mean = Coefficient { term: Term::Mean, limit: 2e-4, initial_std: 1e-4 };
 //! let half = Coefficient { term: Term::HalfWidth, limit: 5e-5, initial_std: 2e-5 };
-//! let adapter = Adapter::new(&AdaptSettings {
+//! let settings = AdaptSettings {
 //!     coefficients: [mean, half], noise_rad: 2e-6, memory_measurements: 1e4, gate: 5.0, settle_rad: 1e-5,
 //!     torque_limit_n_m: 0.0,
-//! })?;
+//! };
+//! # let drive = Drive::new(188, 190, FixedMember::Flexspline).unwrap();
+//! # let limits = Limits {
+//! #     tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5,
+//! #     hold_rad: 1e-6,
+//! # };
+//! # let joint = Joint::new(drive, limits, Overrun::SkipAndCount).unwrap();
+//! # let store = Store::new();
+//! let adapter = Adapter::new(&settings, &joint, &store, 0)?; // after the table is activated
 //! let mut learnt = adapter.start();
 //! learnt.set_learning(Learning::On);
 //! // Each tick, after `Joint::tick`: the adjustment for the input of the next.

@@ -140,7 +140,7 @@ pub extern "C" fn flexspline_encoder_read(
         if !encoder.read(at, reading) {
             return Err(FlexsplineStatus::Argument);
         }
-        give(angle_counts, encoder.angle_counts(at))
+        give(angle_counts, encoder.angle(at).ok_or(FlexsplineStatus::NotInitialised)?)
     };
     status(read())
 }

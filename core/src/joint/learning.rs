@@ -24,16 +24,21 @@ pub struct AdaptState<const N: usize> {
 }
 
 impl<const N: usize> Adapter<N> {
-    /// Checks the settings.
+    /// Checks the settings. The coefficients are of this joint, with the table that is in use now: saved states carry
+    /// both, and are restored only where they belong.
+    ///
+    /// `unit` distinguishes joints with the same settings and the same table, such as the wheels of a rover; 0 if there
+    /// is one. Without a table there is no owner. Make it anew after another table was activated, and [`Self::reset`]
+    /// the state: what was learnt belongs to the table before.
     ///
     /// # Errors
     /// [`AdaptError`] names the first that is out of its range.
-    pub fn new(settings: &AdaptSettings<N>) -> Result<Self, AdaptError> {
-        Self::of_first(settings, N)
+    pub fn new(settings: &AdaptSettings<N>, joint: &Joint, store: &Store, unit: u32) -> Result<Self, AdaptError> {
+        Ok(Self::of_first(settings, N)?.owned_by(joint, store, unit))
     }
 
-    /// An adapter of the first N coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
-    /// come to, and are in no sum and no saved state.
+    /// An adapter of the first N coefficients, of nobody: those after them (`NO_COEFFICIENT`) change no bit of what
+    /// these come to, and are in no sum and no saved state.
     pub(crate) fn of_first(settings: &AdaptSettings<N>, used: usize) -> Result<Self, AdaptError> {
         adapt::Adapter::of_first(settings, used).map(|adapter| Self { adapter: Sealed::new(adapter) })
     }
@@ -101,13 +106,8 @@ impl<const N: usize> Adapter<N> {
         self.adapter.with(look).flatten().unwrap_or([(f32::NAN, f32::NAN); N])
     }
 
-    /// Says whose coefficients are learnt: of this joint, with the table that is in use now. Saved states carry both,
-    /// and are restored only where they belong.
-    ///
-    /// `unit` distinguishes joints with the same settings and the same table, such as the wheels of a rover; 0
-    /// if there is one.
-    #[must_use]
-    pub fn owned_by(self, joint: &Joint, store: &Store, unit: u32) -> Self {
+    /// The same of another owner.
+    pub(crate) fn owned_by(self, joint: &Joint, store: &Store, unit: u32) -> Self {
         let owned = self.adapter.open().map(|adapter| adapter.owned_by(joint, store, unit));
         owned.map_or(self, |adapter| Self { adapter: Sealed::new(adapter) })
     }
@@ -125,7 +125,7 @@ impl<const N: usize> Adapter<N> {
     /// | bytes | what, little endian |
     /// |---|---|
     /// | 4 | `FXA`, version 2 |
-    /// | 8 | id of the table, as [`Self::owned_by`] found it; else zeros |
+    /// | 8 | id of the table, as [`Self::new`] found it; else zeros |
     /// | 8, 4 | sums of the joint's settings, number of the unit; else zeros |
     /// | 4 | sum of the settings |
     /// | 4·N | coefficients in units of their limits, `f32` |
@@ -142,12 +142,6 @@ impl<const N: usize> Adapter<N> {
         self.adapter.with(save).flatten().flatten()
     }
 
-    /// A state from [`Self::save`], in [`Learning::Off`]; `None` where [`Self::try_restore`] has an error.
-    #[must_use]
-    pub fn restore(&self, bytes: &[u8]) -> Option<AdaptState<N>> {
-        self.try_restore(bytes).ok()
-    }
-
     /// A state from [`Self::save`], in [`Learning::Off`], of the same coefficients and the same owner.
     ///
     /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one,
@@ -155,7 +149,7 @@ impl<const N: usize> Adapter<N> {
     ///
     /// # Errors
     /// [`AdaptRestoreError`] says why the bytes are no state of this adapter; one that is lost has other coefficients.
-    pub fn try_restore(&self, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
+    pub fn restore(&self, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
         self.restore_first(N, bytes)
     }
 

@@ -612,6 +612,9 @@ crate::upset::upsets!(JointSettings {
     rate,
     acceleration,
     largest_move,
+    largest_bend,
+    spike,
+    tick_s,
     patience,
     fade,
     fade_step,
@@ -1346,6 +1349,44 @@ mod tests {
         assert!(run.tick(&back).uncertainty_rad == 0.0);
     }
 
+    /// Every bit of what is kept of an adjustment between two ticks; and two words of it, which are not used.
+    #[test]
+    fn an_upset_of_an_adjustment_is_mended_or_not_used() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        let adjustment = Adjustment::from_rad(-1.4e-4, 1e-5);
+        let tick = |run: &Loop, adjustment| {
+            let (mut store, mut state) = (run.store.clone(), run.state);
+            run.joint.tick(&images(), &mut store, &mut state, &Input { adjustment, ..run.input(4e-3) })
+        };
+        for _ in 0..100 {
+            let out = run.tick(&Input { adjustment, ..run.input(4e-3) });
+            run.generator = out.command;
+        }
+        let expected = tick(&run, adjustment);
+        assert!(expected.quality == Quality::InRange && expected.uncertainty_rad == 0.0);
+        for bit in 0..adjustment.bits() {
+            let mut hit = adjustment;
+            hit.flip(bit, &mut std::string::String::new());
+            assert_eq!(tick(&run, hit), expected, "{bit}");
+            assert_eq!(hit.plus(Adjustment::default()), adjustment);
+            hit.flip((bit + 40) % adjustment.bits(), &mut std::string::String::new());
+            let lost = tick(&run, hit);
+            assert!(lost.flags.contains(Flags::NOT_CORRECTED) && lost.quality == Quality::Disabled, "{bit}: {lost:?}");
+            assert_eq!(lost.correction_rad, expected.correction_rad, "{bit}");
+            // And what is added to it.
+            let lost = tick(&run, hit.plus(adjustment));
+            assert!(lost.flags.contains(Flags::NOT_CORRECTED), "{bit}");
+        }
+        // What its maker does not know the tick does not know either.
+        let open = tick(&run, adjustment.with_uncertainty(1e-5));
+        assert!(open.quality == Quality::Uncertain && (open.uncertainty_rad - 1e-5).abs() < 2e-9, "{open:?}");
+        assert_eq!(open.command, expected.command);
+        for unknown in [f32::NAN, -1.0, 1.0] {
+            assert_eq!(adjustment.with_uncertainty(unknown).uncertainty_rad(), Adjustment::MAX_RAD);
+        }
+    }
+
     #[test]
     fn settings_that_make_no_sense_are_named() {
         let named = |limits: Limits| Joint::new(fixture::drive(), limits, Overrun::HoldLast).unwrap_err().name;
@@ -1537,7 +1578,7 @@ mod tests {
                 run.generator = run.generator.offset_rad(moved as f32);
                 let sample = present.then_some(run.generator);
                 let (adjustment, most) = if adjusted {
-                    (Adjustment { mean_counts, half_width_counts }, 0.13)
+                    (Adjustment::new(mean_counts, half_width_counts), 0.13)
                 } else {
                     (Adjustment::default(), 0.03)
                 };

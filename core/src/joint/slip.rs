@@ -183,7 +183,8 @@ pub const fn saved_slip_bytes(elements: usize) -> usize {
 
 /// First bytes of a saved state; the last byte is the version.
 const SAVED_MARK: [u8; 4] = *b"FXS\x02";
-/// Table and joint of a state that was saved without them.
+/// Table and joint of a state that is saved without them, from C.
+#[cfg(any(test, feature = "c-api"))]
 pub(crate) const NOBODY: [u32; 4] = [0; 4];
 
 impl<const N: usize> Springs<N> {
@@ -281,23 +282,17 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         slip.unwrap_or(Slip { error_rad: 0.0, uncertainty_rad: Adjustment::MAX_RAD })
     }
 
-    /// Writes the state with a CRC-32, for storage across a reset: the first [`saved_slip_bytes`]`(N)` bytes. `None` if
-    /// there are fewer, before the first update, or if springs or deflections are lost. It belongs to no joint:
-    /// [`Self::save_for`] has one.
+    /// Writes the state with joint, table and a CRC-32, for storage across a reset: the first
+    /// [`saved_slip_bytes`]`(N)` bytes. `None` if there are fewer, before the first update, or if springs or
+    /// deflections are lost.
     ///
     /// Little endian: `FXS` and the version 2, id of the table (8 bytes), sums of the joint's settings (2 × `u32`),
-    /// variable (`i64`), lower ends, upper ends (`i32`), sum of the springs, CRC-32 of all before. Table and joint are
-    /// zeros if they are not known.
-    pub fn save(&self, state: &SlipState<N, V>, bytes: &mut [u8]) -> Option<usize> {
-        self.save_first(state, NOBODY, N, bytes)
-    }
-
-    /// As [`Self::save`], with joint and table: it is restored for the same ones alone.
-    pub fn save_for(&self, state: &SlipState<N, V>, joint: &Joint, store: &Store, bytes: &mut [u8]) -> Option<usize> {
+    /// variable (`i64`), lower ends, upper ends (`i32`), sum of the springs, CRC-32 of all before.
+    pub fn save(&self, state: &SlipState<N, V>, joint: &Joint, store: &Store, bytes: &mut [u8]) -> Option<usize> {
         self.save_first(state, owner(joint, store), N, bytes)
     }
 
-    /// The same for the first N springs.
+    /// The same for the first N springs, of somebody or [`NOBODY`].
     pub(crate) fn save_first(
         &self,
         state: &SlipState<N, V>,
@@ -315,19 +310,12 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         Some(saved_slip_bytes(used))
     }
 
-    /// A state from [`Self::save`]; `None` if the bytes are damaged, were saved with other springs, or belong to a
-    /// joint. Only if the joint cannot have moved (for a bank on the torque: the load cannot have changed) meanwhile,
-    /// else [`SlipState::unknown`].
-    #[must_use]
-    pub fn restore(&self, bytes: &[u8]) -> Option<SlipState<N, V>> {
-        self.restore_first(NOBODY, N, bytes).ok()
-    }
-
-    /// As [`Self::restore`], from [`Self::save_for`], for the same joint with the same table.
+    /// A state from [`Self::save`], for the same joint with the same table. Only if the joint cannot have moved (for a
+    /// bank on the torque: the load cannot have changed) meanwhile, else [`SlipState::unknown`].
     ///
     /// # Errors
     /// [`RestoreError`]; other springs count as another joint. Then start from [`SlipState::unknown`].
-    pub fn restore_for(&self, joint: &Joint, store: &Store, bytes: &[u8]) -> Result<SlipState<N, V>, RestoreError> {
+    pub fn restore(&self, joint: &Joint, store: &Store, bytes: &[u8]) -> Result<SlipState<N, V>, RestoreError> {
         self.restore_first(owner(joint, store), N, bytes)
     }
 
@@ -461,23 +449,26 @@ mod tests {
     fn states_come_back_from_bytes_or_not_at_all() {
         let mut state = SlipState::unknown();
         let mut saved = [0; saved_slip_bytes(3)];
-        assert_eq!(bank().save(&state, &mut saved), None);
+        let save = |state: &SlipState<3>, bytes: &mut [u8]| bank().save_first(state, NOBODY, 3, bytes);
+        let restore = |bytes: &[u8]| bank().restore_first(NOBODY, 3, bytes).ok();
+        assert_eq!(save(&state, &mut saved), None);
         run(&mut state, i64::MIN / 3, &[WIDTH / 2, -7, 19]);
-        assert_eq!(bank().save(&state, &mut saved), Some(60));
-        assert_eq!(bank().save(&state, &mut saved[..59]), None);
-        assert_eq!(bank().restore(&saved), Some(state));
+        assert_eq!(save(&state, &mut saved), Some(60));
+        assert_eq!(save(&state, &mut saved[..59]), None);
+        assert_eq!(restore(&saved), Some(state));
         for bit in 0..saved.len() * 8 {
             let mut damaged = saved;
             damaged[bit / 8] ^= 1 << (bit % 8);
-            assert_eq!(bank().restore(&damaged), None, "bit {bit}");
+            assert_eq!(restore(&damaged), None, "bit {bit}");
         }
         let mut other = *bank().springs.kept();
         other.gains[1] *= 2.0;
-        assert_eq!(SlipBank::<3>::of(other.widths, other.gains, 3).restore(&saved), None);
+        let other = SlipBank::<3>::of(other.widths, other.gains, 3);
+        assert_eq!(other.restore_first(NOBODY, 3, &saved), Err(RestoreError::OtherJoint));
         for (lower, upper) in [(1, 0), (-WIDTH, 0), (0, WIDTH)] {
             let impossible = Deflections { lower: [lower, 0, 0], upper: [upper, 0, 0], ..*state.deflections.kept() };
-            bank().save(&of(impossible), &mut saved).unwrap();
-            assert_eq!(bank().restore(&saved), None);
+            save(&of(impossible), &mut saved).unwrap();
+            assert_eq!(restore(&saved), None);
         }
     }
 

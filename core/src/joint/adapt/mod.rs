@@ -162,15 +162,6 @@ enum Contact {
 }
 
 impl<const N: usize> Adapter<N> {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`AdaptError`] names the first that is out of its range.
-    #[cfg(test)]
-    pub fn new(settings: &AdaptSettings<N>) -> Result<Self, AdaptError> {
-        Self::of_first(settings, N)
-    }
-
     /// An adapter of the first N coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
     /// come to, and are in no sum and no saved state.
     pub(crate) fn of_first(settings: &AdaptSettings<N>, used: usize) -> Result<Self, AdaptError> {
@@ -227,13 +218,7 @@ impl<const N: usize> Adapter<N> {
         })
     }
 
-    /// The same adapter of this joint with the table in use. Saved states carry both and are restored only where they
-    /// belong.
-    ///
-    /// `unit` distinguishes joints with the same settings and the same table, such as the wheels of a rover; 0
-    /// if there is one. Activate the table first; without one there is no owner. Make it anew after another table was
-    /// activated, and [`Self::reset`] the state: what was learnt belongs to the table before.
-    #[must_use]
+    /// The same adapter of this joint with the table in use.
     pub fn owned_by(mut self, joint: &Joint, store: &Store, unit: u32) -> Self {
         self.owner = Owner::of(joint, store, unit);
         self
@@ -247,23 +232,13 @@ impl<const N: usize> Adapter<N> {
 
     /// A state in which nothing is learnt yet, [`Learning::Off`].
     #[must_use]
-    pub const fn start(&self) -> AdaptState<N> {
+    pub fn start(&self) -> AdaptState<N> {
         AdaptState {
             x: [0.0; N],
             d: self.first,
             u: [[0.0; N]; N],
             learning: Learning::Off.code(),
-            counters: AdaptCounters {
-                used: 0,
-                quiet: 0,
-                outliers: 0,
-                outliers_in_a_row: 0,
-                unsettled: 0,
-                unexcited: 0,
-                untrusted: 0,
-                limited: 0,
-                restarts: 0,
-            },
+            counters: AdaptCounters::default(),
             generator: GeneratorAngle::ZERO,
             contact: OutputAngle::ZERO,
             has_contact: 0,
@@ -282,11 +257,6 @@ impl<const N: usize> Adapter<N> {
 
     /// One tick: follows the play, learns from the measurement if there is one, and returns the addition in the next
     /// tick.
-    ///
-    /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed
-    /// the limits or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement
-    /// that is used takes 1834 instructions for five coefficients, whatever the values, and one without at most 452
-    /// (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
         let contact = self.follow(state, seen.play);
         let generator = seen.input.generator.unwrap_or(state.generator);
@@ -491,25 +461,7 @@ impl<const N: usize> Adapter<N> {
         found
     }
 
-    /// Writes what was learnt, with a CRC-32, for storage across a reset: the first [`saved_adapt_bytes`]`(N)` bytes.
-    /// `None` if there are fewer.
-    ///
-    /// | bytes | what, little endian |
-    /// |---|---|
-    /// | 4 | `FXA`, version 2 |
-    /// | 8 | id of the table, as [`Self::owned_by`] found it; else zeros |
-    /// | 8, 4 | sums of the joint's settings, number of the unit; else zeros |
-    /// | 4 | sum of the settings |
-    /// | 4·N | coefficients in units of their limits, `f32` |
-    /// | 4·N | `D`, `f32` |
-    /// | 2·N·(N−1) | `U` above its diagonal, by columns, `f32` |
-    /// | 4 | CRC-32 of all before |
-    #[cfg(test)]
-    pub fn save(&self, state: &AdaptState<N>, bytes: &mut [u8]) -> Option<usize> {
-        self.save_first(state, N, bytes)
-    }
-
-    /// The same for the first N coefficients.
+    /// See `save` of what is kept under a sum: the first N coefficients.
     pub(crate) fn save_first(&self, state: &AdaptState<N>, used: usize, bytes: &mut [u8]) -> Option<usize> {
         let bytes = bytes.get_mut(..saved_adapt_bytes(used))?;
         let above = state.u.iter().take(used).enumerate().flat_map(|(j, column)| column.iter().take(j));
@@ -518,26 +470,7 @@ impl<const N: usize> Adapter<N> {
         Some(saved_adapt_bytes(used))
     }
 
-    /// A state from [`Self::save`], in [`Learning::Off`]; `None` where [`Self::try_restore`] has an error.
-    #[cfg(test)]
-    #[must_use]
-    pub fn restore(&self, bytes: &[u8]) -> Option<AdaptState<N>> {
-        self.try_restore(bytes).ok()
-    }
-
-    /// A state from [`Self::save`], in [`Learning::Off`], of the same coefficients and the same owner.
-    ///
-    /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one,
-    /// and half of the evidence that is needed otherwise starts it anew.
-    ///
-    /// # Errors
-    /// [`AdaptRestoreError`] says why the bytes are no state of this adapter.
-    #[cfg(test)]
-    pub fn try_restore(&self, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
-        self.restore_first(N, bytes)
-    }
-
-    /// The same for the first N coefficients.
+    /// See `restore` there.
     pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
         let needed = saved_adapt_bytes(used);
         let short = AdaptRestoreError::Short { found: bytes.len(), needed };

@@ -89,7 +89,7 @@ fn run(counter: &Counter) -> Option<[Range; 6]> {
     let images = Images::new(first, second);
     let mut store = Store::new();
     store.activate(&images, JOINT.drive(), 21.0).ok()?;
-    let adapter = Adapter::new(&SETTINGS).ok()?;
+    let adapter = Adapter::new(&SETTINGS, &joint, &store, 0).ok()?;
     let mut learnt = adapter.start();
     learnt.set_learning(Learning::On);
     let bank = SlipBank::new(SPRINGS)?;
@@ -139,8 +139,8 @@ fn run(counter: &Counter) -> Option<[Range; 6]> {
     }
     let mut saved = [0; 128];
     adapter.save(&learnt, &mut saved)?;
-    bank.save(&springs, &mut saved)?;
-    let restored = bank.restore(&saved)?;
+    bank.save(&springs, &joint, &store, &mut saved)?;
+    let restored = bank.restore(&joint, &store, &saved).ok()?;
     let done = learnt.counters().used > INPUTS / 20 && restored == springs && black_box(sum) != 0;
     done.then_some(ranges)
 }
