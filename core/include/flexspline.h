@@ -17,7 +17,7 @@
 // There was no sample.
 #define FLEXSPLINE_FLAG_SAMPLE_LOST 1
 
-// The sample was not believed.
+// The sample was not believed; or it was, and what the one before it did to the play was taken back.
 #define FLEXSPLINE_FLAG_GLITCH 2
 
 // The tick came late.
@@ -232,6 +232,13 @@
 
 // The tick itself was not to be trusted.
 #define FLEXSPLINE_VERDICT_UNTRUSTED 6
+
+// What was learnt, or the settings, are lost to an upset: nothing is added, and the uncertainty is all that can have
+// been added. Until `flexspline_learner_set`, or until the learner is made anew.
+#define FLEXSPLINE_VERDICT_LOST 7
+
+// Eight-byte words of a [`FlexsplineAdjustment`].
+#define FLEXSPLINE_ADJUSTMENT_WORDS 3
 
 // Springs that slip with the nominal output: widths in rad, 0 to 0.05, gains without a unit.
 #define FLEXSPLINE_SLIP_OF_OUTPUT 0
@@ -508,6 +515,11 @@ typedef struct FlexsplineOutput {
   // `FLEXSPLINE_FLAG_...`.
   uint16_t flags;
 } FlexsplineOutput;
+
+// What is added to the table in the next tick, and how far it is known, under a sum: an upset of one word is mended.
+typedef struct FlexsplineAdjustment {
+  uint64_t opaque[FLEXSPLINE_ADJUSTMENT_WORDS];
+} FlexsplineAdjustment;
 
 // An encoder, and where it is.
 typedef struct FlexsplineEncoder {
@@ -967,6 +979,14 @@ enum FlexsplineStatus flexspline_store_init(struct FlexsplineStore *store);
 enum FlexsplineStatus flexspline_joint_init(struct FlexsplineJoint *joint,
                                             const struct FlexsplineSettings *settings);
 
+// Limits the acceleration of a joint's generator, rad/s^2: a sample that would need more is a glitch, and one that is
+// out and back within two ticks is taken back. A multiple of what motor and load can do. Without this call a sample
+// may need full speed in one tick, and one that is out and back a 64th of that in each. After
+// `flexspline_joint_init`: a state saved before belongs to another joint. `FLEXSPLINE_STATUS_ARGUMENT` if it is not
+// finite or too small to matter in a tick.
+enum FlexsplineStatus flexspline_joint_limit_acceleration(struct FlexsplineJoint *joint,
+                                                          float rad_s2);
+
 // Makes the state of a joint after a reset.
 enum FlexsplineStatus flexspline_state_init(struct FlexsplineState *state);
 
@@ -1055,12 +1075,25 @@ enum FlexsplineStatus flexspline_state_restore(struct FlexsplineState *state,
 
 // One tick: from what was measured to what to command, once every `tick_s` and in the order of time.
 // `FLEXSPLINE_STATUS_OK` also where no correction could be made: `flags` and `quality` of the output say so.
+//
+// The adjustment in the input is taken as known, and unprotected: what learning or springs add belongs into an
+// adjustment of its own (`flexspline_tick_adjusted`).
 enum FlexsplineStatus flexspline_tick(const struct FlexsplineJoint *joint,
                                       const struct FlexsplineImages *table,
                                       struct FlexsplineStore *store,
                                       struct FlexsplineState *state,
                                       const struct FlexsplineInput *input,
                                       struct FlexsplineOutput *output);
+
+// As `flexspline_tick`, with an adjustment that was kept under a sum since the tick before, and has its uncertainty;
+// that of the input comes on top.
+enum FlexsplineStatus flexspline_tick_adjusted(const struct FlexsplineJoint *joint,
+                                               const struct FlexsplineImages *table,
+                                               struct FlexsplineStore *store,
+                                               struct FlexsplineState *state,
+                                               const struct FlexsplineInput *input,
+                                               const struct FlexsplineAdjustment *adjustment,
+                                               struct FlexsplineOutput *output);
 
 // A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the
 // program was compiled with another header, or with options that change a layout (packed structures, enumerations of
@@ -1137,13 +1170,15 @@ enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder
                                                int64_t near_counts);
 
 // Takes a reading of the encoder of a joint's generator and reports the angle to give to its next tick, counts of
-// 2^-32 turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the
-// next is taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns
-// are right as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less
-// than a third of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that
-// (give the tick no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick,
-// so that motion hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where
-// encoder or joint are lost.
+// 2^-32 turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: one
+// that is further from the one before than a tick allows is taken from the angle that was believed last, for N ticks;
+// in N + 2 the generator cannot make half of what the register counts. So the turns are right as soon as the readings
+// are, if no more than N - 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at
+// 500 rad/s. After more the encoder is lost: give the tick no sample, and call `flexspline_encoder_start` with what is
+// known otherwise. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no
+// sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
+// hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint
+// are lost.
 enum FlexsplineStatus flexspline_joint_read(const struct FlexsplineJoint *joint,
                                             const struct FlexsplineState *state,
                                             struct FlexsplineEncoder *encoder,
@@ -1410,6 +1445,17 @@ enum FlexsplineStatus flexspline_slip_restore(struct FlexsplineSlip *slip,
                                               const uint8_t *saved,
                                               size_t saved_bytes);
 
+// Makes an adjustment that adds nothing.
+enum FlexsplineStatus flexspline_adjustment_init(struct FlexsplineAdjustment *adjustment);
+
+// Adds to an adjustment, counts of 2^-32 turn at the output, each sum held within +-0.049 rad; and to its uncertainty,
+// rad: that of springs, and that of a learner whose verdict is lost (else 0: its standard deviation is no bound).
+// Where it is not 0 the next tick is uncertain by it. Below 0 and what is no number count as the largest.
+enum FlexsplineStatus flexspline_adjustment_add(struct FlexsplineAdjustment *adjustment,
+                                                int32_t mean_counts,
+                                                int32_t half_width_counts,
+                                                float uncertainty_rad);
+
 // Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model
 // of your own say. Each sum is held within
 // +-0.049 rad.
@@ -1637,7 +1683,8 @@ enum FlexsplineStatus flexspline_slip_restore_for(struct FlexsplineSlip *slip,
   FLEXSPLINE_AND_SIZE_(FlexsplineStartUp) \
   FLEXSPLINE_AND_SIZE_(FlexsplineStartUpSettings) \
   FLEXSPLINE_AND_SIZE_(FlexsplineReadings) \
-  FLEXSPLINE_AND_SIZE_(FlexsplineStartUpStep)
+  FLEXSPLINE_AND_SIZE_(FlexsplineStartUpStep) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineAdjustment)
 
 // Sizes and alignments that the compiler can check without the library.
 #if defined(__cplusplus)

@@ -28,6 +28,7 @@ mod telemetry;
 mod torque;
 
 use beside::{given, health_code, quality_code};
+use learn::{ADJUSTMENT_MARK, FlexsplineAdjustment};
 #[cfg(not(feature = "fuzzing"))]
 use names::*;
 #[cfg(feature = "fuzzing")]
@@ -510,6 +511,21 @@ pub extern "C" fn flexspline_joint_init(
     status(make())
 }
 
+/// Limits the acceleration of a joint's generator, rad/s^2: a sample that would need more is a glitch, and one that is
+/// out and back within two ticks is taken back. A multiple of what motor and load can do. Without this call a sample
+/// may need full speed in one tick, and one that is out and back a 64th of that in each. After
+/// `flexspline_joint_init`: a state saved before belongs to another joint. `FLEXSPLINE_STATUS_ARGUMENT` if it is not
+/// finite or too small to matter in a tick.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_joint_limit_acceleration(joint: *mut FlexsplineJoint, rad_s2: f32) -> FlexsplineStatus {
+    let limit = || {
+        let joint: &mut Joint = get_mut(joint, JOINT_MARK)?;
+        *joint = joint.with_generator_acceleration(rad_s2).map_err(|_| FlexsplineStatus::Argument)?;
+        Ok(())
+    };
+    status(limit())
+}
+
 /// Makes the state of a joint after a reset.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_init(state: *mut FlexsplineState) -> FlexsplineStatus {
@@ -830,6 +846,9 @@ fn core_input(input: &FlexsplineInput) -> Input {
 
 /// One tick: from what was measured to what to command, once every `tick_s` and in the order of time.
 /// `FLEXSPLINE_STATUS_OK` also where no correction could be made: `flags` and `quality` of the output say so.
+///
+/// The adjustment in the input is taken as known, and unprotected: what learning or springs add belongs into an
+/// adjustment of its own (`flexspline_tick_adjusted`).
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_tick(
     joint: *const FlexsplineJoint,
@@ -839,15 +858,50 @@ pub extern "C" fn flexspline_tick(
     input: *const FlexsplineInput,
     output: *mut FlexsplineOutput,
 ) -> FlexsplineStatus {
+    tick(joint, table, store, state, input, None, output)
+}
+
+/// As `flexspline_tick`, with an adjustment that was kept under a sum since the tick before, and has its uncertainty;
+/// that of the input comes on top.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_tick_adjusted(
+    joint: *const FlexsplineJoint,
+    table: *const FlexsplineImages,
+    store: *mut FlexsplineStore,
+    state: *mut FlexsplineState,
+    input: *const FlexsplineInput,
+    adjustment: *const FlexsplineAdjustment,
+    output: *mut FlexsplineOutput,
+) -> FlexsplineStatus {
+    tick(joint, table, store, state, input, Some(adjustment), output)
+}
+
+#[inline(always)]
+fn tick(
+    joint: *const FlexsplineJoint,
+    table: *const FlexsplineImages,
+    store: *mut FlexsplineStore,
+    state: *mut FlexsplineState,
+    input: *const FlexsplineInput,
+    adjustment: Option<*const FlexsplineAdjustment>,
+    output: *mut FlexsplineOutput,
+) -> FlexsplineStatus {
     let tick = || {
         apart([span(joint), span(store), span(state), span(output)])?;
         usable(output)?;
         let images = images(table, [span(store), span(state), span(output)])?;
+        if let Some(own) = adjustment {
+            clear(span(own), [span(store), span(state), span(output)])?;
+        }
         let input = copied(input)?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
         let state: &mut JointState = get_mut(state, STATE_MARK)?;
-        let input = core_input(&input);
+        let mut input = core_input(&input);
+        if let Some(own) = adjustment {
+            let own: &Adjustment = get(own, ADJUSTMENT_MARK)?;
+            input.adjustment = input.adjustment.plus(*own);
+        }
         let found = joint.tick(&images, store, state, &input);
         let given = FlexsplineOutput {
             command_counts: found.command.counts(),
@@ -887,6 +941,16 @@ mod tests {
         acceleration_rad_s2: 5.0,
         generator_rate_rad_s: 600.0,
         hold_rad: 0.0,
+    };
+
+    /// The same for Rust.
+    pub(super) const LIMITS: Limits = Limits {
+        tick_s: SETTINGS.tick_s,
+        rate_rad_s: SETTINGS.rate_rad_s,
+        acceleration_rad_s2: SETTINGS.acceleration_rad_s2,
+        generator_rate_rad_s: SETTINGS.generator_rate_rad_s,
+        patience: SETTINGS.patience,
+        hold_rad: SETTINGS.hold_rad,
     };
 
     pub(super) struct Objects {
@@ -1183,14 +1247,6 @@ mod tests {
 
     #[test]
     fn settings_make_the_joint_they_name() {
-        let limits = Limits {
-            tick_s: SETTINGS.tick_s,
-            rate_rad_s: SETTINGS.rate_rad_s,
-            acceleration_rad_s2: SETTINGS.acceleration_rad_s2,
-            generator_rate_rad_s: SETTINGS.generator_rate_rad_s,
-            patience: SETTINGS.patience,
-            hold_rad: SETTINGS.hold_rad,
-        };
         let members = [FixedMember::Flexspline, FixedMember::CircularSpline];
         let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 50 }];
         for (fixed_member, member) in (0..).zip(members) {
@@ -1198,7 +1254,7 @@ mod tests {
                 let mut o = blank();
                 let settings = FlexsplineSettings { fixed_member, overrun, ..SETTINGS };
                 assert_eq!(flexspline_joint_init(&mut o.joint, &settings), FlexsplineStatus::Ok);
-                let expected = Joint::new(Drive::new(188, 190, member).unwrap(), limits, policy).unwrap();
+                let expected = Joint::new(Drive::new(188, 190, member).unwrap(), LIMITS, policy).unwrap();
                 assert_eq!(get::<_, Joint>(&o.joint, JOINT_MARK), Ok(&expected), "{fixed_member} {overrun}");
             }
         }

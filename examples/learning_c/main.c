@@ -126,6 +126,8 @@ int main(void)
     int64_t target = 0, command = 0, expected[AHEAD] = {0};
     FlexsplineAdapted adapted = {0};
     FlexsplineSlipReport slipped = {0};
+    FlexsplineAdjustment adjustment; // from tick to tick, under a sum
+    must(flexspline_adjustment_init(&adjustment), "adjustment");
     double missed = 0.0, ahead_missed = 0.0;
     printf("second,learning,missed_arcsec_rms,ahead_arcsec_rms,offset_arcsec,springs_known\n");
     for (int tick = 0; tick < SECONDS * TICKS_IN_SECOND; tick++) {
@@ -153,18 +155,21 @@ int main(void)
 
         // The tick of the joint.
         target += forward ? 13672 : -13672; // 0.02 rad/s
-        FlexsplineInput input = {.generator_counts = generator, .target_counts = target, .torque_n_m = torque, .has_generator = 1};
-        must(flexspline_input_add(&input, adapted.mean_counts, adapted.half_width_counts), "learnt");
-        const FlexsplineInput own = input; // what springs add is no error to be learnt
-        if (second_now >= 3)
-            must(flexspline_input_add(&input, slipped.mean_counts, 0), "springs");
+        const FlexsplineInput input = {.generator_counts = generator, .target_counts = target, .torque_n_m = torque, .has_generator = 1};
+        FlexsplineInput own = input; // what springs add is no error to be learnt
+        must(flexspline_input_add(&own, adapted.mean_counts, adapted.half_width_counts), "learnt");
         FlexsplineOutput out;
-        must(flexspline_tick(&joint, &table, &store, &state, &input, &out), "tick");
+        must(flexspline_tick_adjusted(&joint, &table, &store, &state, &input, &adjustment, &out), "tick");
         command = out.command_counts;
 
         // Beside it: what is learnt, what slips, what lies ahead, what changed.
         must(flexspline_learner_update(&learner, &state, &own, &out, tick % STAR_EVERY == 0, output, &adapted), "learner");
         must(flexspline_slip_update_torque(&slip, torque, &slipped), "springs");
+        const float unknown = adapted.verdict == FLEXSPLINE_VERDICT_LOST ? adapted.uncertainty_rad : 0.0f;
+        must(flexspline_adjustment_init(&adjustment), "adjustment");
+        must(flexspline_adjustment_add(&adjustment, adapted.mean_counts, adapted.half_width_counts, unknown), "learnt");
+        if (tick + 1 >= 3 * TICKS_IN_SECOND)
+            must(flexspline_adjustment_add(&adjustment, slipped.mean_counts, 0, slipped.uncertainty_rad), "springs");
         const FlexsplineMeasured measured = {.torque_n_m = -load, .speed_rad_s = forward ? 0.02f : -0.02f};
         must(flexspline_observer_step(&observer, &predictor, &measured), "observer");
         const FlexsplineNow now = {

@@ -7,9 +7,9 @@ use super::{
 };
 use crate::joint::{NO_COEFFICIENT, NOBODY};
 use crate::{
-    AdaptCounters, AdaptRestoreError, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, Joint, JointState,
-    Learning, LoadTorque, OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Store, TableId, Term,
-    TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
+    AdaptRestoreError, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, Joint, JointState, Learning,
+    LoadTorque, OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Store, TableId, Term, TorqueSlipElement,
+    Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 use core::mem::MaybeUninit;
 
@@ -58,11 +58,24 @@ pub const FLEXSPLINE_VERDICT_UNSETTLED: u8 = 4;
 pub const FLEXSPLINE_VERDICT_UNEXCITED: u8 = 5;
 /// The tick itself was not to be trusted.
 pub const FLEXSPLINE_VERDICT_UNTRUSTED: u8 = 6;
+/// What was learnt, or the settings, are lost to an upset: nothing is added, and the uncertainty is all that can have
+/// been added. Until `flexspline_learner_set`, or until the learner is made anew.
+pub const FLEXSPLINE_VERDICT_LOST: u8 = 7;
+
+/// Eight-byte words of a [`FlexsplineAdjustment`].
+pub const FLEXSPLINE_ADJUSTMENT_WORDS: usize = 3;
 
 /// Springs that slip with the nominal output: widths in rad, 0 to 0.05, gains without a unit.
 pub const FLEXSPLINE_SLIP_OF_OUTPUT: u8 = 0;
 /// Springs that slip with the load torque: widths in N m, 0 to 10000, gains in rad/(N m).
 pub const FLEXSPLINE_SLIP_OF_TORQUE: u8 = 1;
+
+/// What is added to the table in the next tick, and how far it is known, under a sum: an upset of one word is mended.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineAdjustment {
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_ADJUSTMENT_WORDS],
+}
 
 /// A few coefficients that measurements of the output teach, and what is learnt.
 #[repr(C)]
@@ -212,6 +225,7 @@ struct CSprings {
     used: u8,
 }
 
+pub(super) const ADJUSTMENT_MARK: u32 = 0x7844_5446;
 const LEARNER_MARK: u32 = 0x784c_5446;
 const SLIP_MARK: u32 = 0x7842_5446;
 
@@ -642,6 +656,31 @@ pub(super) fn restore_slip(
         Bank::Torque(bank, state) => *state = bank.restore_first(owner, used, kept).map_err(restore_status)?,
     }
     Ok(())
+}
+
+/// Makes an adjustment that adds nothing.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_adjustment_init(adjustment: *mut FlexsplineAdjustment) -> FlexsplineStatus {
+    status(put(adjustment, ADJUSTMENT_MARK, Adjustment::default()))
+}
+
+/// Adds to an adjustment, counts of 2^-32 turn at the output, each sum held within +-0.049 rad; and to its uncertainty,
+/// rad: that of springs, and that of a learner whose verdict is lost (else 0: its standard deviation is no bound).
+/// Where it is not 0 the next tick is uncertain by it. Below 0 and what is no number count as the largest.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_adjustment_add(
+    adjustment: *mut FlexsplineAdjustment,
+    mean_counts: i32,
+    half_width_counts: i32,
+    uncertainty_rad: f32,
+) -> FlexsplineStatus {
+    let add = || {
+        let adjustment: &mut Adjustment = get_mut(adjustment, ADJUSTMENT_MARK)?;
+        let added = Adjustment::new(mean_counts, half_width_counts);
+        *adjustment = adjustment.plus(added).with_uncertainty(uncertainty_rad);
+        Ok(())
+    };
+    status(add())
 }
 
 /// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model

@@ -1,12 +1,13 @@
 //! Everything beside a tick, from C and from Rust in one sequence: the same bits. And what each call refuses.
 
-use super::tests::{INPUT, SETTINGS, made, pair};
+use super::tests::{INPUT, LIMITS, made, pair};
 use super::*;
 use super::{ask::*, beside::*, encoder::*, learn::*, telemetry::*, torque::*};
+use crate::joint::NOBODY;
 use crate::{
     AdaptSettings, AdaptState, Adapter, Aged, Approach, Coefficient, Direction, Disturbance, Encoder, EncoderSettings,
-    EncoderWrap, Inertias, Learning, LoadTorque, Measured, Noise, Predictor, PredictorState, RateGroup, Recorder, Ring,
-    Seen, SlipBank, SlipElement, SlipState, Table, Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement,
+    EncoderWrap, Inertias, Learning, LoadTorque, Measured, Noise, Predictor, PredictorState, Recorder, Ring, Seen,
+    SlipBank, SlipElement, SlipState, Table, Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement,
     Verdict, fixture, saved_adapt_bytes, saved_slip_bytes,
 };
 use FlexsplineStatus::{
@@ -40,22 +41,22 @@ const LEARN: FlexsplineLearnSettings = FlexsplineLearnSettings {
     torque_limit_n_m: 20.0,
 };
 
-fn adapter() -> Adapter<5> {
+fn adapter(joint: &Joint, store: &Store) -> Adapter<5> {
     let terms = [Term::Mean, Term::WindUp, Term::HalfWidth, Term::Cos(2), Term::Sin(2)];
     let mut places = terms.into_iter().zip(COEFFICIENTS);
     let coefficients = core::array::from_fn(|_| {
         let (term, FlexsplineCoefficient { limit, initial_std, .. }) = places.next().unwrap();
         Coefficient { term, limit, initial_std }
     });
-    Adapter::new(&AdaptSettings {
+    let settings = AdaptSettings {
         coefficients,
         noise_rad: LEARN.noise_rad,
         memory_measurements: LEARN.memory_measurements,
         gate: LEARN.gate,
         settle_rad: LEARN.settle_rad,
         torque_limit_n_m: LEARN.torque_limit_n_m,
-    })
-    .unwrap()
+    };
+    Adapter::new(&settings, joint, store, 0).unwrap()
 }
 
 const SPRINGS: [FlexsplineSpring; 3] = [
@@ -108,15 +109,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     let (mut o, table, images) = (made(), pair(&image, &twin), Images::new(&image, &twin));
     assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), Done);
     assert_eq!(flexspline_state_request(&mut o.state, FLEXSPLINE_MODE_TRACKING), Done);
-    let limits = Limits {
-        tick_s: SETTINGS.tick_s,
-        rate_rad_s: SETTINGS.rate_rad_s,
-        acceleration_rad_s2: SETTINGS.acceleration_rad_s2,
-        generator_rate_rad_s: SETTINGS.generator_rate_rad_s,
-        patience: SETTINGS.patience,
-        hold_rad: SETTINGS.hold_rad,
-    };
-    let joint = Joint::new(fixture::drive(), limits, Overrun::FadeOut { ticks: 50 }).unwrap();
+    let joint = Joint::new(fixture::drive(), LIMITS, Overrun::FadeOut { ticks: 50 }).unwrap();
     let (mut store, mut state) = (Store::new(), JointState::new());
     store.activate(&images, &fixture::drive(), 20.0).unwrap();
     state.request(Mode::Tracking).unwrap();
@@ -132,6 +125,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     assert_eq!(flexspline_torque_init_sensor(&mut c_path, &TORQUE, 0.05, 50.0), Done);
     assert_eq!(flexspline_aged_init(&mut c_aged, 4), Done);
     assert_eq!(flexspline_learner_init(&mut c_learner, &LEARN, COEFFICIENTS.as_ptr(), 5), Done);
+    assert_eq!(flexspline_learner_bind(&mut c_learner, &o.joint, &*o.store, 0), Done);
     assert_eq!(flexspline_learner_set(&mut c_learner, FLEXSPLINE_LEARNING_ON), Done);
     assert_eq!(flexspline_slip_init(&mut c_slip, FLEXSPLINE_SLIP_OF_OUTPUT, SPRINGS.as_ptr(), 3), Done);
     let kind = FLEXSPLINE_SLIP_OF_TORQUE;
@@ -141,7 +135,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     assert_eq!(flexspline_recorder_init(&mut c_recorder, 8, 10, 0, FLEXSPLINE_FULL_LOSE_OLDEST), Done);
     let mut c_records = [FlexsplineRecord::default(); 8];
     // And from Rust.
-    let (encoder, adapter, predictor, (bank, torque_bank)) = (encoder(), adapter(), predictor(), banks());
+    let (encoder, adapter, predictor, (bank, torque_bank)) = (encoder(), adapter(&joint, &store), predictor(), banks());
     let mut path = TorquePath::new(TorqueSettings {
         tick_s: TORQUE.tick_s,
         bandwidth_hz: TORQUE.bandwidth_hz,
@@ -160,7 +154,9 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     let start = encoder.reading(1 << 30);
     assert_eq!(flexspline_encoder_start(&mut c_encoder, start, 0), Done);
     let mut at = encoder.start(start, 0).unwrap();
-    let (mut c_mean, mut c_half, mut adjustment) = (0, 0, Adjustment::default());
+    let (mut c_adjustment, mut own, mut adjustment) =
+        (room!(FlexsplineAdjustment), Adjustment::default(), Adjustment::default());
+    assert_eq!(flexspline_adjustment_init(&mut c_adjustment), Done);
     let (mut used, mut taken, mut moved, mut corrected) = (0, 0, 0i64, 0);
     for tick in 0..4000u32 {
         // A second forward, a second back, with a load that goes to and fro and a sensor that is silent at times.
@@ -173,7 +169,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
         let mut c_angle = 0;
         assert_eq!(flexspline_joint_read(&o.joint, &o.state, &mut c_encoder, reading, &mut c_angle), Done);
         let angle = joint.read(&state, &encoder, &mut at, reading).unwrap();
-        assert_eq!((c_angle, c_angle), (angle.counts(), encoder.angle_counts(&at)));
+        assert_eq!((Some(c_angle), c_angle), (encoder.angle(&at), angle.counts()));
 
         let load = 8.0 - 0.02 * (tick % 800) as f32;
         let (silent, in_mesh) = (tick % 50 > 42, tick % 7 == 0);
@@ -194,10 +190,10 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
             torque_n_m: c_torque,
             missed_ticks: u16::from(tick == 777),
             has_generator: u8::from(tick % 97 != 5),
-            mean_counts: c_mean,
-            half_width_counts: c_half,
+            mean_counts: 0,
+            half_width_counts: 0,
         };
-        let generator = GeneratorAngle::from_counts(encoder.angle_counts(&at));
+        let generator = angle;
         let input = Input {
             generator: (tick % 97 != 5).then_some(generator),
             target: OutputAngle::from_counts(target),
@@ -206,24 +202,32 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
             adjustment,
         };
         let mut c_out = FlexsplineOutput::default();
-        assert_eq!(flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &c_input, &mut c_out), Done);
+        let (store_at, state_at) = (&raw mut *o.store, &raw mut o.state);
+        let ticked =
+            flexspline_tick_adjusted(&o.joint, &table, store_at, state_at, &c_input, &c_adjustment, &mut c_out);
+        assert_eq!(ticked, Done);
         let out = joint.tick(&images, &mut store, &mut state, &input);
         assert_eq!((c_out.command_counts, c_out.output_counts), (out.command.counts(), out.output.counts()));
         assert_eq!((c_out.correction_rad, c_out.flags), (out.correction_rad, out.flags.bits()));
+        assert_eq!((c_out.uncertainty_rad, c_out.quality), (out.uncertainty_rad, quality_code(out.quality)));
         corrected += u32::from(out.correction_rad != 0.0 && out.flags == Flags::default());
 
         // A star now and then: the output is off by what the learner is to find.
         let star = tick % 3 == 0;
         let off = 60_000 + if forward { -9_000 } else { 9_000 } - tick as i64 % 11 * 500;
-        let measured = out.output.counts() + off - i64::from(adjustment.mean_counts);
+        let measured = out.output.counts() + off - i64::from(adjustment.mean_counts());
         let mut c_adapted = FlexsplineAdapted::default();
+        // Of the adjustment its own alone.
+        let (mean_counts, half_width_counts) = (own.mean_counts(), own.half_width_counts());
+        let c_own = FlexsplineInput { mean_counts, half_width_counts, ..c_input };
+        let learns = Input { adjustment: own, ..input };
         let found =
-            flexspline_learner_update(&mut c_learner, &o.state, &c_input, &c_out, star as u8, measured, &mut c_adapted);
+            flexspline_learner_update(&mut c_learner, &o.state, &c_own, &c_out, star as u8, measured, &mut c_adapted);
         assert_eq!(found, Done);
         let measured = star.then_some(OutputAngle::from_counts(measured));
-        let adapted = adapter.update(&mut learnt, &Seen { input: &input, output: &out, play: state.play(), measured });
-        assert_eq!(c_adapted.mean_counts, adapted.adjustment.mean_counts, "{tick}");
-        assert_eq!(c_adapted.half_width_counts, adapted.adjustment.half_width_counts, "{tick}");
+        let adapted = adapter.update(&mut learnt, &Seen { input: &learns, output: &out, play: state.play(), measured });
+        assert_eq!(c_adapted.mean_counts, adapted.adjustment.mean_counts(), "{tick}");
+        assert_eq!(c_adapted.half_width_counts, adapted.adjustment.half_width_counts(), "{tick}");
         assert_eq!(c_adapted.uncertainty_rad.to_bits(), adapted.uncertainty_rad.to_bits(), "{tick}");
         used += u32::from(c_adapted.verdict == FLEXSPLINE_VERDICT_USED);
         assert_eq!(c_adapted.verdict == FLEXSPLINE_VERDICT_USED, adapted.verdict == Verdict::Used);
@@ -245,14 +249,18 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
             );
             assert_eq!((c.mean_counts, c.is_known == 1), (rust.mean_counts(), known));
         }
-        let mut next = FlexsplineInput { mean_counts: c_adapted.mean_counts, ..c_input };
-        next.half_width_counts = c_adapted.half_width_counts;
-        for mean_counts in [c_slip_report.mean_counts, c_slip_report_torque.mean_counts] {
-            assert_eq!(flexspline_input_add(&mut next, mean_counts, 0), Done);
+        let lost = if c_adapted.verdict == FLEXSPLINE_VERDICT_LOST { c_adapted.uncertainty_rad } else { 0.0 };
+        assert_eq!(flexspline_adjustment_init(&mut c_adjustment), Done);
+        for (mean, half, uncertainty_rad) in [
+            (c_adapted.mean_counts, c_adapted.half_width_counts, lost),
+            (c_slip_report.mean_counts, 0, c_slip_report.uncertainty_rad),
+            (c_slip_report_torque.mean_counts, 0, c_slip_report_torque.uncertainty_rad),
+        ] {
+            assert_eq!(flexspline_adjustment_add(&mut c_adjustment, mean, half, uncertainty_rad), Done);
         }
-        (c_mean, c_half) = (next.mean_counts, next.half_width_counts);
-        adjustment = slip_torque.added_to(slip.added_to(adapted.adjustment));
-        assert_eq!((c_mean, c_half), (adjustment.mean_counts, adjustment.half_width_counts));
+        own = adapted.adjustment;
+        adjustment = slip_torque.added_to(slip.added_to(own));
+        assert_eq!(get::<_, Adjustment>(&c_adjustment, ADJUSTMENT_MARK), Ok(&adjustment));
 
         let c_measured =
             FlexsplineMeasured { torque_n_m: load, speed_rad_s: 0.02 * direction as f32, twist_rad: load * 3e-5 };
@@ -301,19 +309,20 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
             assert_eq!(adapter.save(&learnt, &mut expected), Some(written));
             assert_eq!(bytes[..written], expected);
             assert_eq!(flexspline_learner_init(&mut c_learner, &LEARN, COEFFICIENTS.as_ptr(), 5), Done);
+            assert_eq!(flexspline_learner_bind(&mut c_learner, &o.joint, &*o.store, 0), Done);
             assert_eq!(flexspline_learner_restore(&mut c_learner, bytes.as_ptr(), written), Done);
             assert_eq!(flexspline_learner_set(&mut c_learner, FLEXSPLINE_LEARNING_ON), Done);
             learnt = adapter.restore(&expected).unwrap();
             learnt.set_learning(Learning::On);
             let mut expected = [0; saved_slip_bytes(3)];
             assert_eq!(flexspline_slip_save(&c_slip, bytes.as_mut_ptr(), bytes.len(), &mut written), Done);
-            assert_eq!(bank.save(&springs, &mut expected), Some(written));
+            assert_eq!(bank.save_first(&springs, NOBODY, 3, &mut expected), Some(written));
             assert_eq!(bytes[..written], expected);
             assert_eq!(flexspline_slip_set(&mut c_slip, 0), Done);
             assert_eq!(flexspline_slip_restore(&mut c_slip, bytes.as_ptr(), written), Done);
             let mut expected = [0; saved_slip_bytes(2)];
             assert_eq!(flexspline_slip_save(&c_torque_slip, bytes.as_mut_ptr(), bytes.len(), &mut written), Done);
-            assert_eq!(torque_bank.save(&torque_springs, &mut expected), Some(written));
+            assert_eq!(torque_bank.save_first(&torque_springs, NOBODY, 2, &mut expected), Some(written));
             assert_eq!(bytes[..written], expected);
             // Springs of another kind are others.
             assert_eq!(flexspline_slip_restore(&mut c_slip, bytes.as_ptr(), written), Saved);
@@ -489,7 +498,7 @@ fn each_number_has_its_name() {
         (flexspline_identity_name, &["hashing", "same", "other"]),
         (flexspline_learning_name, &["off", "frozen", "on"]),
         (flexspline_term_name, &["mean", "wind-up", "half-width", "cosine", "sine"]),
-        (flexspline_verdict_name, &["idle", "used", "quiet", "outlier", "unsettled", "unexcited", "untrusted"]),
+        (flexspline_verdict_name, &["idle", "used", "quiet", "outlier", "unsettled", "unexcited", "untrusted", "lost"]),
     ];
     for (name, names) in one {
         let found: Vec<_> = (0..names.len() as u8).map(|code| text(name(code))).collect();
@@ -652,8 +661,9 @@ fn what_is_not_allowed_is_refused() {
         assert_eq!(after, bound[1]);
     }
     assert_eq!(flexspline_learner_reset(&mut learner), Done);
-    let other: Option<AdaptState<5>> = adapter().restore(&bytes);
-    assert!(other.is_some());
+    let (joint, empty) = (get(&o.joint, JOINT_MARK).unwrap(), Store::new());
+    let other: Result<AdaptState<5>, _> = adapter(joint, &empty).restore(&bytes);
+    assert!(other.is_ok());
 
     let mut slip = room!(FlexsplineSlip);
     let init = |slip: &mut FlexsplineSlip, variable, spring| flexspline_slip_init(slip, variable, &spring, 1);

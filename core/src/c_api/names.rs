@@ -103,7 +103,7 @@ const _: () = {
 };
 
 /// Sizes of all that goes between C and the library: what `FLEXSPLINE_LAYOUT` of the header adds up.
-const SIZES: [usize; 50] = [
+const SIZES: [usize; 51] = [
     size_of::<FlexsplineStatus>(),
     size_of::<usize>(),
     size_of::<FlexsplineStore>(),
@@ -154,6 +154,7 @@ const SIZES: [usize; 50] = [
     size_of::<FlexsplineStartUpSettings>(),
     size_of::<FlexsplineReadings>(),
     size_of::<FlexsplineStartUpStep>(),
+    size_of::<FlexsplineAdjustment>(),
 ];
 
 /// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the
@@ -344,7 +345,9 @@ pub extern "C" fn flexspline_learning_name(learning: u8) -> *const c_char {
 /// Name of what became of a measurement: of `FLEXSPLINE_VERDICT_...`.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_verdict_name(verdict: u8) -> *const c_char {
-    text(&[c"idle", c"used", c"quiet", c"outlier", c"unsettled", c"unexcited", c"untrusted"], verdict as usize)
+    const TEXTS: [&CStr; 8] =
+        [c"idle", c"used", c"quiet", c"outlier", c"unsettled", c"unexcited", c"untrusted", c"lost"];
+    text(&TEXTS, verdict as usize)
 }
 
 /// Name of a coefficient: of `FLEXSPLINE_TERM_...`.
