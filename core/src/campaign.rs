@@ -544,18 +544,17 @@ fn what_feeds_a_tick_goes_on_to_the_same_bits_after_any_single_bit() {
 #[test]
 fn the_loss_of_learning_or_springs_is_in_every_tick() {
     let (run, worlds) = undisturbed(Story::Fed, &[203]);
-    let lose = |object: &mut dyn FnMut(usize, &mut String)| [3, 90].map(|bit| object(bit, &mut String::new()));
-    for lost in 0..6 {
+    let flips: [fn(&mut Feed, usize); 6] = [
+        |feed, bit| feed.adapter.flip(bit, &mut String::new()),
+        |feed, bit| feed.learnt.flip(bit, &mut String::new()),
+        |feed, bit| feed.bank.flip(bit, &mut String::new()),
+        |feed, bit| feed.springs.flip(bit, &mut String::new()),
+        |feed, bit| feed.torque_bank.flip(bit, &mut String::new()),
+        |feed, bit| feed.torque_springs.flip(bit, &mut String::new()),
+    ];
+    for (lost, flip) in flips.into_iter().enumerate() {
         let mut hit = worlds[0].clone();
-        let Feed { adapter, learnt, bank, springs, torque_bank, torque_springs, .. } = &mut hit.feed;
-        match lost {
-            0 => lose(&mut |bit, path| adapter.flip(bit, path)),
-            1 => lose(&mut |bit, path| learnt.flip(bit, path)),
-            2 => lose(&mut |bit, path| bank.flip(bit, path)),
-            3 => lose(&mut |bit, path| springs.flip(bit, path)),
-            4 => lose(&mut |bit, path| torque_bank.flip(bit, path)),
-            _ => lose(&mut |bit, path| torque_springs.flip(bit, path)),
-        };
+        [3, 90].into_iter().for_each(|bit| flip(&mut hit.feed, bit));
         let (mut worst, mut off, mut said) = (Fate::Harmless, 0.0f64, 0);
         for (tick, twin) in run.iter().enumerate().skip(203) {
             let found = go_on(&mut hit, Story::Fed, tick, twin);

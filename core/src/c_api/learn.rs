@@ -200,6 +200,11 @@ pub struct FlexsplineSlipReport {
     pub is_known: u8,
 }
 
+const LEARNING: [(u8, Learning); 3] = [
+    (FLEXSPLINE_LEARNING_OFF, Learning::Off),
+    (FLEXSPLINE_LEARNING_FROZEN, Learning::Frozen),
+    (FLEXSPLINE_LEARNING_ON, Learning::On),
+];
 const MOST: usize = FLEXSPLINE_LEARNER_COEFFICIENTS;
 const SPRINGS: usize = FLEXSPLINE_SLIP_SPRINGS;
 
@@ -282,12 +287,9 @@ pub extern "C" fn flexspline_learner_init(
 pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learning: u8) -> FlexsplineStatus {
     let set = || {
         let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
-        learner.state.set_learning(match learning {
-            FLEXSPLINE_LEARNING_OFF => Learning::Off,
-            FLEXSPLINE_LEARNING_FROZEN => Learning::Frozen,
-            FLEXSPLINE_LEARNING_ON => Learning::On,
-            _ => return Err(FlexsplineStatus::Argument),
-        });
+        let found = LEARNING.into_iter().find(|(code, _)| *code == learning);
+        let (_, learning) = found.ok_or(FlexsplineStatus::Argument)?;
+        learner.state.set_learning(learning);
         Ok(())
     };
     status(set())
@@ -414,7 +416,8 @@ pub extern "C" fn flexspline_learner_report(
     let fill = || {
         apart([span(learner), span(report)])?;
         let learner: &Learner = get(learner, LEARNER_MARK)?;
-        let counters = learner.state.counters();
+        let (counters, now) = (learner.state.counters(), learner.state.learning());
+        let learning = LEARNING.into_iter().find(|(_, learning)| *learning == now).map_or(0, |(code, _)| code);
         give(
             report,
             FlexsplineLearnerReport {
@@ -427,11 +430,7 @@ pub extern "C" fn flexspline_learner_report(
                 untrusted: counters.untrusted,
                 limited: counters.limited,
                 restarts: counters.restarts,
-                learning: match learner.state.learning() {
-                    Learning::Off => FLEXSPLINE_LEARNING_OFF,
-                    Learning::Frozen => FLEXSPLINE_LEARNING_FROZEN,
-                    Learning::On => FLEXSPLINE_LEARNING_ON,
-                },
+                learning,
                 coefficients: learner.used,
             },
         )

@@ -345,9 +345,7 @@ pub extern "C" fn flexspline_learning_name(learning: u8) -> *const c_char {
 /// Name of what became of a measurement: of `FLEXSPLINE_VERDICT_...`.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_verdict_name(verdict: u8) -> *const c_char {
-    const TEXTS: [&CStr; 8] =
-        [c"idle", c"used", c"quiet", c"outlier", c"unsettled", c"unexcited", c"untrusted", c"lost"];
-    text(&TEXTS, verdict as usize)
+    text(&[c"idle", c"used", c"quiet", c"outlier", c"unsettled", c"unexcited", c"untrusted", c"lost"], verdict as usize)
 }
 
 /// Name of a coefficient: of `FLEXSPLINE_TERM_...`.
