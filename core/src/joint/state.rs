@@ -26,10 +26,11 @@ pub struct JointState {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct SealedState {
     kept: Kept,
+    samples: LastSamples,
     sums: [u32; 2],
 }
 
-/// Values that a tick changes.
+/// Values that a tick changes: 64 bytes, the most that is copied without a call.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kept {
     pub play: PlayState,
@@ -50,6 +51,11 @@ pub(super) struct Kept {
     /// Mode, what samples there were, and towards which flank the last motion went; a whole word, of which every bit
     /// means something or is zero.
     pub marks: u32,
+}
+
+/// How the generator moved last, copied apart from the other values for the same reason.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LastSamples {
     /// Way of the generator in the last tick, and how much it was longer than that in the tick before, counts: of
     /// samples that were believed ([`IN_A_ROW`]).
     pub step: i32,
@@ -93,17 +99,14 @@ impl Kept {
         uncorrected: 0,
         fading: 0,
         marks: Mode::Off.code(),
-        step: 0,
-        bend: 0,
-        free: [0; 2],
     };
     /// Neither copy is whole.
     const LOST: Self = Self { marks: Mode::Safe.code(), ..Self::NEW };
 
     #[inline(never)]
-    const fn sums(&self) -> u64 {
+    const fn sums(&self, samples: &LastSamples) -> u64 {
         let (nominal, [error, lower, upper, half]) = self.play.parts();
-        let [free_lower, free_upper] = self.free;
+        let LastSamples { step, bend, free: [free_lower, free_upper] } = *samples;
         sums!(
             SUMS_START;
             low(nominal),
@@ -121,8 +124,8 @@ impl Kept {
             self.glitches as u32 | (self.uncorrected as u32) << 16,
             self.fading,
             self.marks,
-            self.step as u32,
-            self.bend as u32,
+            step as u32,
+            bend as u32,
             free_lower as u32,
             free_upper as u32,
         )
@@ -130,7 +133,8 @@ impl Kept {
 
     #[inline(always)]
     const fn sealed(self) -> SealedState {
-        SealedState { kept: self, sums: pair(self.sums()) }
+        let samples = LastSamples::NONE;
+        SealedState { kept: self, samples, sums: pair(self.sums(&samples)) }
     }
 
     #[inline(always)]
@@ -151,10 +155,15 @@ impl Kept {
     }
 }
 
+impl LastSamples {
+    /// Before two samples.
+    const NONE: Self = Self { step: 0, bend: 0, free: [0; 2] };
+}
+
 impl SealedState {
     #[inline(always)]
     const fn is_whole(&self) -> bool {
-        same(pair(self.kept.sums()), self.sums)
+        same(pair(self.kept.sums(&self.samples)), self.sums)
     }
 }
 
@@ -200,9 +209,8 @@ impl core::error::Error for RestoreError {}
 /// Table and joint that something saved belongs to.
 pub(crate) fn owner(joint: &Joint, store: &Store) -> [u32; 4] {
     let [a, b, c, d, e, f, g, h] = store.id().0;
-    let ([turned, added], table) = (joint.sums(), [[a, b, c, d], [e, f, g, h]].map(u32::from_le_bytes));
-    let [low, high] = table;
-    [low, high, turned, added]
+    let [turned, added] = joint.sums();
+    [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]), turned, added]
 }
 
 /// Words of something saved behind its mark and its owner, which must be these.
@@ -212,12 +220,12 @@ pub(super) fn opened(bytes: &[u8], mark: [u8; 4], owner: [u32; 4]) -> Result<imp
         return Err(RestoreError::Version { found });
     }
     let mut next = unseal(bytes).ok_or(RestoreError::Crc)?;
-    let [_, low, high, turned, added] = [next(), next(), next(), next(), next()];
-    let [own_low, own_high, own_turned, own_added] = owner;
-    if [low, high] != [own_low, own_high] {
+    let (_, table, settings) = (next(), [next(), next()], [next(), next()]);
+    let [low, high, turned, added] = owner;
+    if table != [low, high] {
         return Err(RestoreError::OtherTable);
     }
-    if [turned, added] != [own_turned, own_added] {
+    if settings != [turned, added] {
         return Err(RestoreError::OtherJoint);
     }
     Ok(next)
@@ -250,39 +258,41 @@ impl JointState {
 
     /// Values of the copy that is whole.
     #[inline(always)]
-    pub(super) fn open(&self) -> (Kept, CopyStatus) {
+    pub(super) fn open(&self) -> (Kept, LastSamples, CopyStatus) {
         let [first, _] = &self.copies;
         // Copied once.
-        let (mut kept, mut found) = (first.kept, CopyStatus::Whole);
+        let (mut kept, mut samples, mut found) = (first.kept, first.samples, CopyStatus::Whole);
         if !first.is_whole() {
-            found = self.open_other(&mut kept);
+            found = self.open_other(&mut kept, &mut samples);
         }
-        (kept, found)
+        (kept, samples, found)
     }
 
     #[cold]
     #[inline(never)]
-    fn open_other(&self, kept: &mut Kept) -> CopyStatus {
+    fn open_other(&self, kept: &mut Kept, samples: &mut LastSamples) -> CopyStatus {
         let [first, second] = &self.copies;
         if second.is_whole() {
-            *kept = second.kept;
+            (*kept, *samples) = (second.kept, second.samples);
             return CopyStatus::Mended;
         }
         let (one, other) = (first.kept.correction, second.kept.correction);
         // What both have is likely to be what is commanded, and taken back within the limits.
         let correction = if one == other && one.unsigned_abs() <= MOST_FINE { one } else { 0 };
-        *kept = Kept { correction, goal: correction, ..Kept::LOST };
+        (*kept, *samples) = (Kept { correction, goal: correction, ..Kept::LOST }, LastSamples::NONE);
         CopyStatus::Lost
     }
 
     /// Keeps what a tick leaves.
     #[inline(always)]
-    pub(super) const fn close(&mut self, kept: &Kept) {
-        let sums = pair(kept.sums());
+    pub(super) const fn close(&mut self, kept: &Kept, samples: &LastSamples) {
+        let sums = pair(kept.sums(samples));
         let [first, second] = &mut self.copies;
         first.kept = *kept;
+        first.samples = *samples;
         first.sums = sums;
         second.kept = *kept;
+        second.samples = *samples;
         second.sums = sums;
     }
 
@@ -309,28 +319,28 @@ impl JointState {
     /// # Errors
     /// [`ModeError`] if [`Mode::may_become`] says no; the mode stays.
     pub fn request(&mut self, to: Mode) -> Result<(), ModeError> {
-        let (mut kept, found) = self.open();
+        let (mut kept, samples, found) = self.open();
         let from = kept.mode();
         if !from.may_become(to) {
             return Err(ModeError { from, to });
         }
         kept.marks = kept.marks & !MODE | to.code();
-        self.keep(kept, found);
+        self.keep(kept, &samples, found);
         Ok(())
     }
 
     /// On command: which side of the play the drive rests on is not known any more, as after work on it.
     pub fn forget_side(&mut self) {
-        let (mut kept, found) = self.open();
+        let (mut kept, samples, found) = self.open();
         kept.play = PlayState::unknown();
         kept.marks &= !(FLANK | IN_A_ROW);
-        self.keep(kept, found);
+        self.keep(kept, &samples, found);
     }
 
     /// Keeps it between two ticks: what was found not to be whole the next one has to report.
-    fn keep(&mut self, mut kept: Kept, found: CopyStatus) {
+    fn keep(&mut self, mut kept: Kept, samples: &LastSamples, found: CopyStatus) {
         kept.marks |= if found == CopyStatus::Whole { 0 } else { MENDED };
-        self.close(&kept);
+        self.close(&kept, samples);
     }
 
     /// The play; unknown where the state is lost.
@@ -368,7 +378,7 @@ impl JointState {
     /// | 68 | `u32` | CRC-32 of the 68 bytes before |
     #[must_use]
     pub fn save(&self, joint: &Joint, store: &Store) -> [u8; SAVED_JOINT_BYTES] {
-        let (kept, found) = self.open();
+        let (kept, _, found) = self.open();
         let (nominal, [error, lower, upper, half]) = kept.play.parts();
         let generator = kept.generator.counts();
         let [table, more, turned, added] = owner(joint, store);
@@ -440,12 +450,12 @@ impl JointState {
     }
 }
 
-const _: () = assert!(size_of::<Kept>() == 80);
+const _: () = assert!(size_of::<Kept>() == 64);
 
 #[cfg(test)]
 crate::upset::upsets!(JointState { copies, missed_ticks });
 #[cfg(test)]
-crate::upset::upsets!(SealedState { kept, sums });
+crate::upset::upsets!(SealedState { kept, samples, sums });
 #[cfg(test)]
 crate::upset::upsets!(Kept {
     play,
@@ -458,7 +468,6 @@ crate::upset::upsets!(Kept {
     uncorrected,
     fading,
     marks,
-    step,
-    bend,
-    free,
 });
+#[cfg(test)]
+crate::upset::upsets!(LastSamples { step, bend, free });
