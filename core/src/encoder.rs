@@ -181,10 +181,10 @@ impl Encoder {
     }
 
     /// As [`Self::read`] while a reading is no further from the one before than a tick allows. Else from the angle that
-    /// was believed last, that number of ticks ago, while the generator cannot have made half of what the register
-    /// counts since, nor in two ticks more: by those that angle may be off where it was a wrong one within the largest
-    /// move. The angle; `None` as above, and where three moves of a tick are half of what the register counts; and the
-    /// state is lost where nothing says which turn it is.
+    /// was believed last, that number of ticks after three in a row were, while the generator cannot have made half of
+    /// what the register counts since, nor in two ticks more: by those that angle may be off where it was a wrong one
+    /// within the largest move. The angle; `None` as above, and where three moves of a tick are half of what the
+    /// register counts; and the state is lost where nothing says which turn it is.
     pub(crate) fn read_near(
         &self,
         state: &mut EncoderState,

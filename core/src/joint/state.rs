@@ -83,7 +83,7 @@ pub(super) const IN_A_ROW: u32 = 3 << 7;
 pub(super) const FLANK_BEFORE: u32 = FLANK << FLANK_SHIFT;
 /// To those bits, by definition.
 pub(super) const FLANK_SHIFT: u32 = 5;
-/// In the upper half, by definition: ticks since the last sample that was believed.
+/// In the upper half, by definition: ticks since three samples in a row were believed.
 pub(super) const UNSEEN_SHIFT: u32 = 16;
 
 impl Kept {
@@ -148,7 +148,7 @@ impl Kept {
         self.marks & SEEN
     }
 
-    /// Ticks since the last sample that was believed, up to 65 535.
+    /// Ticks since three samples in a row were believed, up to 65 535.
     #[inline(always)]
     pub(super) const fn unseen(&self) -> u32 {
         self.marks >> UNSEEN_SHIFT
