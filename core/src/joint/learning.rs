@@ -72,7 +72,7 @@ impl<const N: usize> Adapter<N> {
     ///
     /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed
     /// the limits or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement
-    /// that is used takes 2303 instructions for five coefficients, whatever the values, and one without at most 921
+    /// that is used takes 2480 instructions for five coefficients, whatever the values, and one without at most 1051
     /// (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
         let uncertainty_rad = Adjustment::MAX_RAD;
