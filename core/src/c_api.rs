@@ -28,9 +28,9 @@ mod telemetry;
 mod torque;
 
 use beside::{given, health_code, quality_code};
-use learn::{ADJUSTMENT_MARK, FlexsplineAdjustment};
+use learn::ADJUSTMENT_MARK;
 #[cfg(not(feature = "fuzzing"))]
-use names::*;
+use {learn::FlexsplineAdjustment, names::*};
 #[cfg(feature = "fuzzing")]
 pub use {ask::*, beside::*, encoder::*, learn::*, names::*, safe::*, telemetry::*, torque::*};
 

@@ -273,7 +273,7 @@ impl EncoderSettings {
             EncoderWrap::Turn => self.counts_per_turn as u64,
             EncoderWrap::Bits(bits) => mask(bits),
         };
-        self.counts_of(largest_move).wrapping_mul(2 * number as u64) < most
+        self.counts_of(largest_move).wrapping_mul((number as u64).wrapping_mul(2)) < most
     }
 
     /// The shorter way from a reading to another; `None` if the register cannot read the other.

@@ -2,6 +2,7 @@
 
 use super::tests::{INPUT, LIMITS, made, pair};
 use super::*;
+#[cfg(not(feature = "fuzzing"))]
 use super::{ask::*, beside::*, encoder::*, learn::*, telemetry::*, torque::*};
 use crate::joint::NOBODY;
 use crate::{
