@@ -203,10 +203,10 @@ impl PlayState {
     }
 
     /// The last move was none: the output is where it was before it, which the next move goes on from. `free` is what
-    /// [`Self::follow`] gave; nothing is done where `taken` is false.
+    /// [`Self::follow`] gave; nothing is done where `mask` is 0 and not all ones.
     #[inline(always)]
-    pub(crate) const fn take_back(&mut self, free: [i32; 2], taken: bool) {
-        let ([lower, upper], mask, offset) = (free, (taken as i32).wrapping_neg(), self.offset_counts());
+    pub(crate) const fn take_back(&mut self, free: [i32; 2], mask: i32) {
+        let ([lower, upper], offset) = (free, self.offset_counts());
         self.lower ^= (self.lower ^ lower) & mask;
         self.upper ^= (self.upper ^ upper) & mask;
         // The centre stays.

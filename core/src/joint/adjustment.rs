@@ -77,7 +77,9 @@ impl Adjustment {
     /// Mean, half-width and uncertainty, counts, mended if they have to be; `None` if it is lost.
     #[inline(always)]
     pub(crate) fn open(&self) -> Option<[i32; 3]> {
-        self.counts.open()
+        let counts = *self.counts.kept();
+        // The sum of three words is no call.
+        if *self == Self::of(counts) { Some(counts) } else { self.counts.open() }
     }
 
     /// Added to the mean error, counts; 0 if it is lost.
@@ -101,7 +103,7 @@ impl Adjustment {
 
 /// An uncertainty in counts: what is no number, or none that can be, is the largest.
 pub(super) fn uncertainty_counts(rad: f32) -> i32 {
-    if rad >= 0.0 && rad <= Adjustment::MAX_RAD { counts_from_rad(rad) } else { Adjustment::MAX_COUNTS }
+    if (0.0..=Adjustment::MAX_RAD).contains(&rad) { counts_from_rad(rad) } else { Adjustment::MAX_COUNTS }
 }
 
 #[inline(always)]

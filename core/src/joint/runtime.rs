@@ -32,8 +32,8 @@ use super::limits::{LEAST_TICK_S, Limits, SettingError, checked};
 use super::mode::{Mode, Overrun};
 use super::signals::{Flags, Input, Output};
 use super::state::{
-    CopyStatus, FINE, FLANK, FLANK_BACKWARD, FLANK_BEFORE, FLANK_FORWARD, FLANK_SHIFT, IN_A_ROW, JointState, Kept,
-    LastSamples, MENDED, MODE, SAMPLED, SEEN, UNSEEN_SHIFT,
+    BEND_TO_SIGN, CopyStatus, FINE, FIRST_IN_A_ROW, FLANK, FLANK_BACKWARD, FLANK_BEFORE, FLANK_FORWARD, FLANK_SHIFT,
+    IN_A_ROW, JointState, Kept, LastSamples, MENDED, MODE, SAMPLED, SEEN, STEP_TO_SIGN, UNSEEN, UNSEEN_SHIFT,
 };
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
@@ -140,13 +140,10 @@ impl Joint {
 
     /// The settings that are whole.
     const fn sound(&self) -> Option<&JointSettings> {
-        let [first, second] = &self.copies;
-        if first.is_whole() {
-            Some(first)
-        } else if second.is_whole() {
-            Some(second)
-        } else {
-            None
+        match &self.copies {
+            [first, _] if first.is_whole() => Some(first),
+            [_, second] if second.is_whole() => Some(second),
+            _ => None,
         }
     }
 
@@ -256,24 +253,11 @@ impl Joint {
     }
 }
 
-/// A sample, judged.
-struct CheckedSample {
-    generator: GeneratorAngle,
-    flags: Flags,
-    /// The play is not where it was thought.
-    forgotten: bool,
-    /// There was no sample that can be believed since the reset.
-    blind: bool,
-    /// All ones if this tick's sample is believed, else 0.
-    good: u32,
-}
-
 impl JointSettings {
     const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
         let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, patience, hold_rad } = limits;
         let tick = tick_s as f64;
-        let tick_ok = checked("tick_s", tick_s, tick, [LEAST_TICK_S, 1.0e3]);
-        if let Err(error) = tick_ok {
+        if let Err(error) = checked("tick_s", tick_s, tick, [LEAST_TICK_S, 1.0e3]) {
             return Err(error);
         }
         // Slower than one part in a tick would be no correction at all.
@@ -341,7 +325,7 @@ impl JointSettings {
     /// A change of the way from tick to tick that noise makes, counts of the generator: twice the dead band, which is
     /// three times the peak.
     const fn noise(&self) -> i32 {
-        let way = self.drive.nominal_generator(OutputAngle::from_counts(self.hold as i64 * 2));
+        let way = self.drive.nominal_generator(OutputAngle::from_counts((self.hold as i64).wrapping_mul(2)));
         let counts = way.counts().unsigned_abs();
         if counts > self.largest_move as u64 { self.largest_move } else { counts as i32 }
     }
@@ -404,17 +388,13 @@ impl JointSettings {
         // An adjustment is learnt, not moved.
         now.play.shift(mean_counts.wrapping_sub(now.adjusted));
         now.adjusted = mean_counts;
-        let CheckedSample { generator, flags, forgotten, blind, good } = self.judge(&mut now, &mut samples, input);
-        if forgotten {
-            now.play = PlayState::unknown();
-            now.marks &= !IN_A_ROW;
-        }
+        let (flags, good) = self.judge(&mut now, &mut samples, input);
         let model = TableModel { memory: store, drive: &self.drive };
         let Estimate { output, error, mut doubt, uncertainty, free, sane, .. } =
-            model.estimate(&point, &mut now.play, generator);
+            model.estimate(&point, &mut now.play, now.generator);
         samples.free = free;
         // Another flank may bear where the target is within what the adjustment is off by, and the dead band.
-        let doubtful = off.wrapping_add(self.hold & ((off > 0) as i32).wrapping_neg());
+        let doubtful = off.wrapping_add(self.hold & off.wrapping_neg() >> 31);
         let from = departure(store.plan(), &point, input.target, &now.play, (output, doubtful));
         // The flank that the last motion went to is kept for a target that is near.
         let near = (from.ahead.saturating_abs() < self.hold) & (now.marks & FLANK != 0);
@@ -423,7 +403,7 @@ impl JointSettings {
         let backward = from.backward ^ ((from.backward ^ last) & near);
         let (found_there, allowed) = model.solve(&point, input.target, backward, &mut doubt);
         let mine = store.is_for(&self.drive);
-        let sane = sane & allowed & mine & doubt.none() & !blind;
+        let sane = sane & allowed & mine & doubt.none() & (now.seen() == SAMPLED);
         let hold = from.hold & !near;
         // The correction that leaves the generator where it is.
         let still = from.ahead.wrapping_add(error);
@@ -431,8 +411,8 @@ impl JointSettings {
         let wanted = found_there ^ (found_there ^ still) & mask;
         let open = from.guess ^ (from.guess ^ from.unknown) & mask;
         // Where the generator is is not known in this tick: the error is any that the table gives.
-        let unseen = point.most(store.plan()).wrapping_add(error.wrapping_abs()) & !good as i32;
-        let known = now.play.is_known() & (open <= 0) & (unseen == 0) & (off == 0);
+        let unseen = point.most(store.plan()).wrapping_add(error.wrapping_abs()) & !good;
+        let known = now.play.is_known() & (open <= 0) & (unseen | off == 0);
         let aimed = open.wrapping_add(point.jump);
         let aimed = if sane { aimed } else { store.plan().limit };
         let uncertainty = if aimed > uncertainty { aimed } else { uncertainty };
@@ -483,66 +463,69 @@ impl JointSettings {
         }
     }
 
-    /// The accepted generator angle, and its information on the play.
+    /// Judges the sample: keeps the accepted generator angle, and its information on the play. Returns all ones if it is
+    /// believed, else 0.
     #[inline(always)]
-    fn judge(&self, now: &mut Kept, samples: &mut LastSamples, input: &Input) -> CheckedSample {
+    fn judge(&self, now: &mut Kept, samples: &mut LastSamples, input: &Input) -> (Flags, i32) {
         let (lost, sample) = match input.generator {
             Some(sample) => (false, sample),
             None => (true, now.generator),
         };
         let seen = now.seen();
-        // Outside ± the largest move. Without one that was saved the first is believed wherever it is.
-        let most = self.largest_move as i64;
+        // Arithmetic instead of choices: the compiler makes branches of choices, and then ticks differ. Where a
+        // difference fits 32 bits its sign shows which number is larger.
+        let all = |sign: i32| sign >> 31;
         let way = sample.minus_counts(now.generator);
-        let far = (way.wrapping_add(most) as u64 > most.wrapping_mul(2) as u64) & (seen != 0);
-        let step = sample.minus_small_counts(now.generator);
+        let step = way as i32;
+        // Zero where the way fits 32 bits.
+        let wide = (way >> 32) as i32 ^ all(step);
+        let wide = wide | wide.wrapping_neg();
+        // Outside ± the largest move. Without one that was saved the first is believed wherever it is.
+        let was_seen = (seen as i32).wrapping_neg();
+        let far = (self.largest_move.wrapping_sub(step.wrapping_abs()) | wide) & was_seen;
         // The way of a tick that came late is that of several.
-        let in_a_row = now.marks & IN_A_ROW & (input.missed_ticks.min(1) as u32).wrapping_sub(1);
+        let on_time = all((input.missed_ticks as i32).wrapping_sub(1));
+        let in_a_row = (now.marks & IN_A_ROW) as i32 & on_time;
+        let present = !(lost as i32).wrapping_neg();
+        let (one_step, one_bend) = (in_a_row << STEP_TO_SIGN & present, in_a_row << BEND_TO_SIGN & present);
         let bend = step.saturating_sub(samples.step);
-        let size = bend.saturating_abs();
+        let size = bend ^ all(bend);
         // The sample before was out, and this one is back: without that one the way would hardly have changed.
-        let without = bend.saturating_add(samples.bend).saturating_add(samples.bend).saturating_abs();
-        let back = !lost & (in_a_row == IN_A_ROW) & (size > self.spike) & (without <= size >> 1);
-        let bent = !lost & (in_a_row > 1 << IN_A_ROW.trailing_zeros()) & (size > self.largest_bend);
-        let far = (far | bent) & !back;
-        // Arithmetic instead of choices: the compiler makes branches of choices, and then ticks differ.
+        let without = bend.saturating_add(samples.bend).saturating_add(samples.bend);
+        let straight = (without ^ all(without)).wrapping_sub(size >> 1).wrapping_sub(1);
+        let back = all(one_bend & self.spike.wrapping_sub(size) & straight & !wide);
+        let bent = one_step & self.largest_bend.wrapping_sub(size);
+        let far = all(far | bent) & !back;
         let patience = self.patience as u32;
-        let glitches = (now.glitches as u32).wrapping_add(1).wrapping_mul(far as u32);
-        let believed = glitches > patience;
-        now.glitches = glitches.wrapping_mul(!believed as u32) as u16;
+        let glitches = (now.glitches as u32).wrapping_add(1) & far as u32;
+        let believed = all(patience.wrapping_sub(glitches) as i32);
+        now.glitches = (glitches & !believed as u32) as u16;
         let glitch = far & !believed;
-        let away = sample.minus_counts(now.generator) & (glitch as i64).wrapping_neg();
-        let generator = sample.offset_counts(away.wrapping_neg());
-        now.generator = generator;
-        let good = ((!lost & !glitch) as u32).wrapping_neg();
-        let seen_now = seen ^ (seen ^ SAMPLED) & good;
+        now.generator = sample.offset_counts((way & glitch as i64).wrapping_neg());
+        let good = present & !glitch;
+        let seen_now = seen ^ (seen ^ SAMPLED) & good as u32;
         now.play.take_back(samples.free, back);
         // What moved the flank is taken back with it.
-        let flank = (now.marks ^ now.marks >> FLANK_SHIFT) & FLANK & (back as u32).wrapping_neg();
-        // One more in a row, up to three; one in which a new place is believed has no way.
-        let one = 1 << IN_A_ROW.trailing_zeros();
-        let row = if in_a_row == IN_A_ROW { in_a_row } else { in_a_row.wrapping_add(one) };
-        let row = (if believed { one } else { row }) & good;
+        let flank = (now.marks ^ now.marks >> FLANK_SHIFT) & FLANK & back as u32;
+        // One more in a row; one in which a new place is believed has no way.
+        let row = ((in_a_row as u32) << 1 | FIRST_IN_A_ROW) & IN_A_ROW & (good & !believed) as u32;
         // One or two may each look like motion and be wrong.
-        let settled = ((row == IN_A_ROW) as u32).wrapping_neg();
-        let unseen = now.unseen().saturating_add(1);
-        let unseen = if unseen >> (32 - UNSEEN_SHIFT) == 0 { unseen } else { now.unseen() } & !settled;
-        let rest = now.marks & !(SEEN | IN_A_ROW | u32::MAX << UNSEEN_SHIFT);
-        now.marks = (rest ^ flank) | seen_now | row | unseen << UNSEEN_SHIFT;
+        let settled = all((row as i32) << BEND_TO_SIGN) as u32;
+        let unseen = (now.marks & UNSEEN).saturating_add(1 << UNSEEN_SHIFT) & UNSEEN & !settled;
+        let rest = now.marks & !(SEEN | IN_A_ROW | UNSEEN);
+        now.marks = (rest ^ flank) | seen_now | row | unseen;
         let half_way = (step >> 1).wrapping_add(samples.step >> 1);
-        samples.step = if back { half_way } else { step };
-        samples.bend = if back { 0 } else { bend };
-        // After too long without an answer of the table nobody followed the play; of small numbers the sign shows which
-        // is larger.
+        samples.step = step ^ (step ^ half_way) & back;
+        samples.bend = bend & !back;
+        // After too long without an answer of the table nobody followed the play.
         let late = patience.wrapping_sub(now.uncorrected as u32) >> 31;
         let sampled = seen >> SAMPLED.trailing_zeros();
-        CheckedSample {
-            generator,
-            flags: Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, glitch | back),
-            forgotten: believed as u32 | sampled & late != 0,
-            blind: seen_now != SAMPLED,
-            good,
+        if believed as u32 | sampled & late != 0 {
+            // The play is not where it was thought.
+            now.play = PlayState::unknown();
+            now.marks &= !IN_A_ROW;
         }
+        (Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, (glitch | back) & 1 != 0), good)
     }
 
     /// The correction wanted in this tick, fine counts, and whether the tick came late.
@@ -584,8 +567,8 @@ impl JointSettings {
         let side = lag >> 31;
         let braking = (self.acceleration as u32).wrapping_add(1) >> 1;
         // Rounded up, so that it is right or one too many.
-        let root = num::sqrt(1.0 + 8.0 * (away as f32 / braking as f32));
-        let ticks = (0.5 * (root * (1.0 + 1e-6) - 1.0)) as u32;
+        let root = num::sqrt::<2>(1.0 + 8.0 * (away as f32 / braking as f32));
+        let ticks = (0.5 * (root * (1.0 + 6e-6) - 1.0)) as u32;
         let lost = |ticks: u32| braking.wrapping_mul(ticks).wrapping_mul(ticks.wrapping_add(1)) >> 1;
         let ticks = ticks.wrapping_sub((lost(ticks) > away) as u32);
         let stoppable = away.wrapping_add(lost(ticks)) / NonZeroU32::MIN.saturating_add(ticks);

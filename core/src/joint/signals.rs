@@ -79,7 +79,7 @@ impl Flags {
 
     #[inline(always)]
     pub(crate) const fn with(self, other: Self, set: bool) -> Self {
-        Self(self.0 | if set { other.0 } else { 0 })
+        Self(self.0 | (set as u16).wrapping_shl(other.0.trailing_zeros()))
     }
 }
 

@@ -76,14 +76,19 @@ pub(super) const FLANK_FORWARD: u32 = 1 << 4;
 pub(super) const FLANK_BACKWARD: u32 = 2 << 4;
 /// The state was mended since the last tick, which the next has to report.
 pub(super) const MENDED: u32 = 1 << 6;
-/// Bits by definition: ticks in a row whose samples were believed, up to three. From two on there is a step, from three
-/// on a bend.
-pub(super) const IN_A_ROW: u32 = 3 << 7;
+/// Bits by definition: a bit for each of the last ticks in a row whose samples were believed, up to three. With the
+/// second there is a step, with the third a bend.
+pub(super) const IN_A_ROW: u32 = 7 << 7;
+pub(super) const FIRST_IN_A_ROW: u32 = 1 << 7;
+/// From those bits to the sign of a word.
+pub(super) const STEP_TO_SIGN: u32 = 31 - 8;
+pub(super) const BEND_TO_SIGN: u32 = 31 - 9;
 /// The flank before the last sample, as that of the last motion.
 pub(super) const FLANK_BEFORE: u32 = FLANK << FLANK_SHIFT;
 /// To those bits, by definition.
-pub(super) const FLANK_SHIFT: u32 = 5;
+pub(super) const FLANK_SHIFT: u32 = 6;
 /// In the upper half, by definition: ticks since three samples in a row were believed.
+pub(super) const UNSEEN: u32 = u32::MAX << UNSEEN_SHIFT;
 pub(super) const UNSEEN_SHIFT: u32 = 16;
 
 impl Kept {
@@ -298,13 +303,10 @@ impl JointState {
 
     /// The copy that is whole, for a look: as the last tick left it.
     const fn kept(&self) -> &Kept {
-        let [first, second] = &self.copies;
-        if first.is_whole() {
-            &first.kept
-        } else if second.is_whole() {
-            &second.kept
-        } else {
-            &Kept::LOST
+        match &self.copies {
+            [first, _] if first.is_whole() => &first.kept,
+            [_, second] if second.is_whole() => &second.kept,
+            _ => &Kept::LOST,
         }
     }
 

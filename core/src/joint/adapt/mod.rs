@@ -390,7 +390,7 @@ impl<const N: usize> Adapter<N> {
         let gains = measure(&mut state.d, &mut state.u, &row, noise);
         let excess = if innovation < 0.0 { -excess } else { excess };
         // What was learnt is forgotten in the direction of the measurement.
-        let (share, mut wander) = (self.forget * num::sqrt(scale) / strength, row);
+        let (share, mut wander) = (self.forget * num::sqrt::<3>(scale) / strength, row);
         for ((x, gain), wander) in state.x.iter_mut().zip(gains).zip(&mut wander) {
             let free = *x + gain * excess;
             let held = num::within(free, [-1.0, 1.0]);
@@ -415,7 +415,7 @@ impl<const N: usize> Adapter<N> {
     fn bound_variances(&self, state: &mut AdaptState<N>) {
         let mut scale = [1.0; N];
         for ((scale, variance), first) in scale.iter_mut().zip(state.variances()).zip(self.first) {
-            *scale = if variance > first { num::sqrt(first / variance) } else { 1.0 };
+            *scale = if variance > first { num::sqrt::<3>(first / variance) } else { 1.0 };
         }
         for ((column, d), by) in state.u.iter_mut().zip(&mut state.d).zip(scale) {
             *d *= by * by;
@@ -445,7 +445,7 @@ impl<const N: usize> Adapter<N> {
         let variance = learnt + state.consistency.doubt(spread_of(row, &self.first));
         Adapted {
             adjustment: Adjustment::from_rad(mean * noise_rad, half * noise_rad),
-            uncertainty_rad: num::sqrt(variance) * noise_rad,
+            uncertainty_rad: num::sqrt::<3>(variance) * noise_rad,
             verdict,
         }
     }
@@ -456,7 +456,7 @@ impl<const N: usize> Adapter<N> {
         let mut found = [(0.0, 0.0); N];
         let parts = state.x.iter().zip(state.variances()).zip(self.limits);
         for (to, ((x, variance), limit)) in found.iter_mut().zip(parts) {
-            *to = (x * limit, num::sqrt(variance) * limit);
+            *to = (x * limit, num::sqrt::<3>(variance) * limit);
         }
         found
     }
