@@ -463,8 +463,8 @@ impl JointSettings {
         }
     }
 
-    /// Judges the sample: keeps the accepted generator angle, and its information on the play. Returns all ones if it is
-    /// believed, else 0.
+    /// Judges the sample: keeps the accepted generator angle, and its information on the play. All ones where it
+    /// is believed, else 0.
     #[inline(always)]
     fn judge(&self, now: &mut Kept, samples: &mut LastSamples, input: &Input) -> (Flags, i32) {
         let (lost, sample) = match input.generator {

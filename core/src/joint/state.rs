@@ -79,9 +79,11 @@ pub(super) const MENDED: u32 = 1 << 6;
 /// Bits by definition: a bit for each of the last ticks in a row whose samples were believed, up to three. With the
 /// second there is a step, with the third a bend.
 pub(super) const IN_A_ROW: u32 = 7 << 7;
+/// The first of them, by definition.
 pub(super) const FIRST_IN_A_ROW: u32 = 1 << 7;
-/// From those bits to the sign of a word.
+/// From the second to the sign of a word, by definition.
 pub(super) const STEP_TO_SIGN: u32 = 31 - 8;
+/// From the third to the sign of a word, by definition.
 pub(super) const BEND_TO_SIGN: u32 = 31 - 9;
 /// The flank before the last sample, as that of the last motion.
 pub(super) const FLANK_BEFORE: u32 = FLANK << FLANK_SHIFT;
@@ -89,6 +91,7 @@ pub(super) const FLANK_BEFORE: u32 = FLANK << FLANK_SHIFT;
 pub(super) const FLANK_SHIFT: u32 = 6;
 /// In the upper half, by definition: ticks since three samples in a row were believed.
 pub(super) const UNSEEN: u32 = u32::MAX << UNSEEN_SHIFT;
+/// To that half, by definition.
 pub(super) const UNSEEN_SHIFT: u32 = 16;
 
 impl Kept {
