@@ -111,7 +111,7 @@ impl Answers {
                 (a + b).to_bits(),
                 (a * b).to_bits(),
                 (a / b).to_bits(),
-                num::sqrt(a).to_bits(),
+                num::sqrt::<3>(a).to_bits(),
                 whole as u32,
                 (black_box(whole) as f32).to_bits(),
             ],

@@ -77,9 +77,7 @@ impl Adjustment {
     /// Mean, half-width and uncertainty, counts, mended if they have to be; `None` if it is lost.
     #[inline(always)]
     pub(crate) fn open(&self) -> Option<[i32; 3]> {
-        let counts = *self.counts.kept();
-        // The sum of three words is no call.
-        if *self == Self::of(counts) { Some(counts) } else { self.counts.open() }
+        self.counts.open()
     }
 
     /// Added to the mean error, counts; 0 if it is lost.

@@ -465,7 +465,7 @@ impl JointSettings {
 
     /// Judges the sample: keeps the accepted generator angle, and its information on the play. All ones where it
     /// is believed, else 0.
-    #[inline(always)]
+    #[inline(never)]
     fn judge(&self, now: &mut Kept, samples: &mut LastSamples, input: &Input) -> (Flags, i32) {
         let (lost, sample) = match input.generator {
             Some(sample) => (false, sample),
@@ -923,9 +923,9 @@ mod tests {
         let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
         let given = joint.with_generator_acceleration(3000.0).unwrap();
         let count_rad = core::f64::consts::TAU / 1_048_576.0;
-        // Where no acceleration is too large it is for good.
+        // Where no acceleration is too large it is for good: by the whole play, 100 µrad.
         let ([_, then], flags) = after_a_wrong_bit(&joint.with_generator_acceleration(1e9).unwrap(), 1 << 28);
-        assert!(then > 50.0 && flags == [false; 2], "{then}");
+        assert!(then > 20.0 && flags == [false; 2], "{then}");
         for (bit, sign) in (0..20).flat_map(|bit| [(bit, 1), (bit, -1)]) {
             let wrong = sign << (12 + bit);
             // At the output, ″.
@@ -935,11 +935,11 @@ mod tests {
             // 600 rad/s in 64 ticks, and that in two: 4.7e-3 rad of the generator. A glitch is beyond 0.6 rad.
             let seen = f64::from(1 << bit) * count_rad > 4.7e-3;
             assert_eq!([at_once, next], [bit >= 17, seen && bit < 17], "bit {bit}");
-            assert!(if seen { then < 0.01 } else { then <= size + 0.01 }, "bit {bit}: {then}");
+            assert!(if seen { then < 0.01 } else { then <= 1.02 * size + 0.01 }, "bit {bit}: {then}");
             let ([at_first, then], flags) = after_a_wrong_bit(&given, wrong);
             let (beyond, back) = (f64::from(1 << bit) * count_rad > 3e-3, f64::from(1 << bit) * count_rad > 1.5e-3);
             assert_eq!(flags, [beyond, back && !beyond], "bit {bit}, with an acceleration");
-            assert!(if back { then < 0.01 } else { then <= size + 0.01 }, "bit {bit}: {then}");
+            assert!(if back { then < 0.01 } else { then <= 1.02 * size + 0.01 }, "bit {bit}: {then}");
             assert!(!beyond || at_first < 0.01, "bit {bit}: {at_first}");
         }
     }

@@ -189,7 +189,7 @@ pub(crate) fn to_solution<M: Memory>(
     let bend = a.wrapping_sub(b).wrapping_add(c.wrapping_sub(b)) as f32;
     let missing = (a.wrapping_add(b) >> 1).wrapping_add(start) as f32;
     let twice = missing + missing;
-    let root = twice / (linear + sqrt(linear * linear - bend * twice));
+    let root = twice / (linear + sqrt::<3>(linear * linear - bend * twice));
     let along = (root * -(CELL as f32)) as i32;
     let along = if along > 0 { along } else { 0 };
     let along = if along < CELL { along } else { CELL };
