@@ -1633,7 +1633,7 @@ enum FlexsplineStatus flexspline_slip_restore_for(struct FlexsplineSlip *slip,
 // What `flexspline_layout` says where program and library agree on the size of all types above: `if (flexspline_layout() != FLEXSPLINE_LAYOUT) stop();`
 #define FLEXSPLINE_AND_SIZE_(type) * 31u + (uint32_t)sizeof(type))
 #define FLEXSPLINE_LAYOUT \
-  ((((((((((((((((((((((((((((((((((((((((((((((((((0u \
+  (((((((((((((((((((((((((((((((((((((((((((((((((((0u \
   FLEXSPLINE_AND_SIZE_(FlexsplineStatus) \
   FLEXSPLINE_AND_SIZE_(size_t) \
   FLEXSPLINE_AND_SIZE_(FlexsplineStore) \
@@ -1721,6 +1721,7 @@ FLEXSPLINE_OBJECT_(FlexsplineTorquePath, FLEXSPLINE_TORQUE_PATH_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineAged, FLEXSPLINE_AGED_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineEncoder, FLEXSPLINE_ENCODER_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineStartUp, FLEXSPLINE_START_UP_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineAdjustment, FLEXSPLINE_ADJUSTMENT_WORDS);
 FLEXSPLINE_CHECK_(packed_structures, sizeof(FlexsplineStateReport) == 8);
 FLEXSPLINE_CHECK_(FlexsplineWord_, sizeof(uint64_t) == 8 && sizeof(float) == 4 && sizeof(double) == 8);
 #endif

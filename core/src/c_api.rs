@@ -29,10 +29,10 @@ mod torque;
 
 use beside::{given, health_code, quality_code};
 use learn::ADJUSTMENT_MARK;
-#[cfg(not(feature = "fuzzing"))]
-use {learn::FlexsplineAdjustment, names::*};
 #[cfg(feature = "fuzzing")]
 pub use {ask::*, beside::*, encoder::*, learn::*, names::*, safe::*, telemetry::*, torque::*};
+#[cfg(not(feature = "fuzzing"))]
+use {learn::FlexsplineAdjustment, names::*};
 
 use crate::{
     ActivateError, Activation, Adjustment, Counters, Drive, FixedMember, Flags, GeneratorAngle, Identity,
