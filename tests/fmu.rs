@@ -82,8 +82,8 @@ fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
         rate_rad_s: 0.05,
         acceleration_rad_s2: 5.0,
         generator_rate_rad_s: 600.0,
-        patience: 5,
-        hold_rad: 2.4e-6,
+        debounce_ticks: 5,
+        deadband_rad: 2.4e-6,
     };
     let joint = Joint::new(drive, limits, Overrun::SkipAndCount).unwrap();
     let (mut store, mut state) = (Store::new(), JointState::new());

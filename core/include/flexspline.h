@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 /// @file Compensation of strain wave drives on a microcontroller: the C interface of the crate flexspline.
-/// Made by cbindgen of core/src/c_api.rs; tests/c_header.rs sees that it is up to date. docs/reference/c_interface.md says how to use it.
+/// Made by cbindgen of core/c_api/src; tests/c_header.rs sees that it is up to date. docs/reference/c_interface.md says how to use it.
 
 #ifndef FLEXSPLINE_H
 #define FLEXSPLINE_H

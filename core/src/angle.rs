@@ -12,12 +12,12 @@
 use core::f64::consts::TAU;
 
 /// Radians in one count: 2π·2⁻³².
-pub(crate) const RAD_PER_COUNT: f32 = (TAU / 4_294_967_296.0) as f32;
+pub const RAD_PER_COUNT: f32 = (TAU / 4_294_967_296.0) as f32;
 /// Counts in one radian: 2³²/2π.
-pub(crate) const COUNTS_PER_RAD: f32 = (4_294_967_296.0 / TAU) as f32;
+pub const COUNTS_PER_RAD: f32 = (4_294_967_296.0 / TAU) as f32;
 
 /// A small angle in counts, rounded to nearest, clamped to ±half a turn; NaN gives 0.
-pub(crate) fn counts_from_rad(small_rad: f32) -> i32 {
+pub fn counts_from_rad(small_rad: f32) -> i32 {
     let counts = small_rad * COUNTS_PER_RAD;
     // `as` truncates towards zero and saturates; half a count makes it round to nearest.
     (counts + if counts < 0.0 { -0.5 } else { 0.5 }) as i32
@@ -106,7 +106,7 @@ macro_rules! angle {
 
             /// `self − other` in counts, clamped to ±half a turn.
             #[must_use]
-            pub(crate) const fn minus_small_counts(self, other: Self) -> i32 {
+            pub const fn minus_small_counts(self, other: Self) -> i32 {
                 let counts = self.minus_counts(other);
                 let (high, low) = ((counts >> 32) as i32, counts as i32);
                 // All ones or all zeros above the sign of the lower half: it fits. Else the limit on its side.

@@ -4,12 +4,12 @@
 static CRC: crc::Crc<u32, crc::Table<1>> = crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
 
 /// CRC-32 (ISO-HDLC), 5.3 instructions a byte on a Cortex-M4.
-pub(crate) fn crc32(bytes: &[u8]) -> u32 {
+pub fn crc32(bytes: &[u8]) -> u32 {
     !crc_bytes(CRC_START, bytes)
 }
 
 /// Writes words, lowest byte first, and behind them the CRC-32 of all before; nothing where there is no room for that.
-pub(crate) fn seal(bytes: &mut [u8], words: impl IntoIterator<Item = u32>) {
+pub fn seal(bytes: &mut [u8], words: impl IntoIterator<Item = u32>) {
     let Some((contents, crc)) = bytes.split_last_chunk_mut::<4>() else { return };
     for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
         *to = from.to_le_bytes();

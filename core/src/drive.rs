@@ -311,11 +311,11 @@ impl Drive {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Drive { flexspline_teeth, circular_spline_teeth, reversed, to_output, to_generator, tooth_rate });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(ToothRatio { whole, fraction });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Rate { periods, rest });
 
 #[cfg(test)]

@@ -91,7 +91,7 @@ struct At {
 
 impl EncoderState {
     /// Nowhere: it is not whole.
-    pub(crate) const NOWHERE: Self = Self { at: Sealed::of([0; 4], 0) };
+    pub const NOWHERE: Self = Self { at: Sealed::of([0; 4], 0) };
 
     fn of(At { reading, since_zero }: At) -> Self {
         Self { at: Sealed::new([low(reading as i64), high(reading as i64), low(since_zero), high(since_zero)]) }
@@ -306,9 +306,9 @@ const fn mask(bits: u8) -> u64 {
     u64::MAX.wrapping_shr(64u32.saturating_sub(bits as u32))
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Encoder { settings });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(EncoderState { at });
 
 #[cfg(test)]

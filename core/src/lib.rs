@@ -12,8 +12,8 @@
 //! const JOINT: Joint = {
 //!     let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
 //!     let limits = Limits {
-//!         tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5,
-//!         hold_rad: 1e-6,
+//!         tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, debounce_ticks: 5,
+//!         deadband_rad: 1e-6,
 //!     };
 //!     let Ok(joint) = Joint::new(drive, limits, Overrun::FadeOut { ticks: 50 }) else { panic!() };
 //!     joint
@@ -68,100 +68,16 @@
 //! few words of the images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone
 //! answers: [`Table::forward`], [`Table::inverse`].
 //!
-//! # Beside the table
-//! Motion of the drive beyond its table goes into the [`Adjustment`] of the next tick, from whatever knows of it.
+//! # The crates next to this one
+//! Motion of the drive that its table does not have goes into the [`Adjustment`] of the next tick, from whatever knows
+//! of it. None of them flies in the tick itself:
 //!
-//! An encoder at the output, or a star or beacon now and then, teaches a few coefficients ([`Adapter`]):
-//! ```
-//! use flexspline::*;
-//!
-//! let mean = Coefficient { term: Term::Mean, limit: 2e-4, initial_std: 1e-4 };
-//! let half = Coefficient { term: Term::HalfWidth, limit: 5e-5, initial_std: 2e-5 };
-//! let settings = AdaptSettings {
-//!     coefficients: [mean, half], noise_rad: 2e-6, memory_measurements: 1e4, gate: 5.0, settle_rad: 1e-5,
-//!     torque_limit_n_m: 0.0,
-//! };
-//! # let drive = Drive::new(188, 190, FixedMember::Flexspline).unwrap();
-//! # let limits = Limits {
-//! #     tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5,
-//! #     hold_rad: 1e-6,
-//! # };
-//! # let joint = Joint::new(drive, limits, Overrun::SkipAndCount).unwrap();
-//! # let store = Store::new();
-//! let adapter = Adapter::new(&settings, &joint, &store, 0)?; // after the table is activated
-//! let mut learnt = adapter.start();
-//! learnt.set_learning(Learning::On);
-//! // Each tick, after `Joint::tick`: the adjustment for the input of the next.
-//! let mut after_tick = |input: &Input, output: &Output, play: &PlayState, measured: Option<OutputAngle>| {
-//!     adapter.update(&mut learnt, &Seen { input, output, play, measured }).adjustment
-//! };
-//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0,
-//! #     uncertainty_rad: 0.0,
-//! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
-//! # let input = Input {
-//! #     generator: Some(GeneratorAngle::ZERO), target: OutputAngle::ZERO, torque_n_m: 0.0, missed_ticks: 0,
-//! #     adjustment: Adjustment::default(),
-//! # };
-//! # let next = after_tick(&input, &output, &PlayState::unknown(), Some(OutputAngle::ZERO.offset_rad(5e-4)));
-//! # assert!(next.mean_counts() > 0);
-//! # Ok::<(), AdaptError>(())
-//! ```
-//! Elastic hysteresis, as springs that slip ([`SlipBank`]), over the nominal output or over the torque:
-//! ```
-//! use flexspline::*;
-//!
-//! let spring = |width_n_m, gain_rad_per_n_m| TorqueSlipElement { width_n_m, gain_rad_per_n_m };
-//! let bank = SlipBank::of_torque([spring(2.0, 4e-6), spring(10.0, 1.5e-6)]).ok_or("widths")?;
-//! let mut springs = SlipState::unknown();
-//! for torque_n_m in [0.0, 30.0, 5.0] {
-//!     let slip = bank.update(&mut springs, torque_n_m);
-//!     let _adjustment = slip.added_to(Adjustment::default());
-//! }
-//! assert!(springs.is_known());
-//! # Ok::<(), &str>(())
-//! ```
-//! Where the output will be some ticks from now, with the table as the output map of two inertias ([`Predictor`]):
-//! ```
-//! use flexspline::*;
-//!
-//! fn in_ten_ticks(
-//!     joint: &Joint, store: &Store, predictor: &Predictor, state: &PredictorState, now: &Now,
-//! ) -> OutputAhead {
-//!     let off = Disturbance { torque_n_m: 0.5, load_change_n_m: 0.05, ..Disturbance::default() };
-//!     let state_bound = [2e-6, 1e-4, 1e-3, 0.5]; // from `Predictor::state_bound`, once
-//!     let ahead = predictor.ahead(state, 12.0, 10, state_bound, &off);
-//!     predictor.output_ahead(joint, store, state, &ahead, now)
-//! }
-//! let inertias = Inertias {
-//!     motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3e4, damping_n_m_s_per_rad: 20.0,
-//! };
-//! let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: None };
-//! let predictor = Predictor::new(inertias, noise, 1e-3)?;
-//! # let _ = (predictor, in_ten_ticks);
-//! # Ok::<(), PredictorError>(())
-//! ```
-//! Records for the ground, and what changed ([`Recorder`], [`Watch`]):
-//! ```
-//! use flexspline::*;
-//!
-//! let mut recorder = Recorder::new(Ring::<64>::new(), core::num::NonZeroU32::new(100).ok_or("every")?);
-//! let mut watch = Watch::new();
-//! let mut after_tick = |tick, state: &JointState, store: &Store, output: &Output| {
-//!     recorder.record(tick, state, store, output);
-//!     let events = watch.see(state, store, output); // with the feature `defmt`: events.log(tick)
-//!     for _event in events.iter() {}
-//! };
-//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0,
-//! #     uncertainty_rad: 0.0,
-//! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
-//! # after_tick(0, &JointState::new(), &Store::new(), &output);
-//! // When there is time: bytes for the ground.
-//! while let Some(record) = recorder.sink().take() {
-//!     let bytes: [u8; RECORD_BYTES] = record.encode();
-//!     assert_eq!(Record::decode(&bytes), Ok(record));
-//! }
-//! # Ok::<(), &str>(())
-//! ```
+//! | crate | contents |
+//! |---|---|
+//! | `flexspline-estimation` | online calibration, Maxwell slip, a two-mass observer |
+//! | `flexspline-telemetry` | records for the ground, events |
+//! | `flexspline-make` | from samples to a table |
+//! | `flexspline-c` | all of them from C |
 //!
 //! # Promises
 //! * No heap, no panic, no `unsafe`: what flies links with a panic handler that cannot be linked.
@@ -182,7 +98,7 @@
 //! * Which side of the play the drive rests on is unknown after a reset, until motion has shown it.
 //! * Angles are integers: turning for years, or a million small steps, adds no error.
 //! * The host makes tables with the code that reads them: one definition of where a node sits ([`grid`]), and the
-//!   deviation from the samples is measured on the finished image ([`make`]).
+//!   deviation from the samples is measured on the finished image (`flexspline-make`).
 //!
 //! # Signs and units
 //! * Angles in radians at the interface, positive counter-clockwise; torque N·m, temperature °C.
@@ -190,15 +106,14 @@
 //!   ([`Drive::corrected_command`]).
 //! * The ratio is signed: `+cs/(cs − fs)` with the flexspline fixed, `−fs/(cs − fs)` with the circular spline fixed.
 //! * Positive load torque turns the output forward and gives positive wind-up.
-//! * A [`Direction`] is that of the output, in samples ([`make::Sample::direction`], a column `direction`: +1 where the
+//! * A [`Direction`] is that of the output, in samples (of `flexspline-make`, a column `direction`: +1 where the
 //!   output turns forward, −1 where backward) as in the play; with the circular spline fixed the generator turns
 //!   against it.
 //!
 //! # Not in here
-//! Rate-dependent friction. The table is quasi-static; elastic oscillation is the [`Predictor`]'s.
+//! Rate-dependent friction. The table is quasi-static; elastic oscillation is for `flexspline-estimation`.
 #![no_std]
-#![cfg_attr(not(any(test, feature = "c-api")), forbid(unsafe_code))]
-#![cfg_attr(any(test, feature = "c-api"), deny(unsafe_code))]
+#![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
     deny(
@@ -213,38 +128,31 @@
     )
 )]
 
-// A static library for a PC has the panic handler of `std`; on the target it has one that cannot be linked.
-#[cfg(any(test, feature = "std", all(feature = "c-api", not(target_os = "none"))))]
+#[cfg(any(test, feature = "testing"))]
 extern crate std;
 
 mod angle;
-#[cfg(all(any(test, feature = "c-api"), not(feature = "fuzzing")))]
-mod c_api;
-#[cfg(all(feature = "c-api", feature = "fuzzing"))]
-#[doc(hidden)]
-#[allow(clippy::not_unsafe_ptr_arg_deref)] // As C calls them; public for `tests/fuzz` alone.
-pub mod c_api;
-#[cfg(test)]
-mod campaign;
 mod crc;
 mod drive;
 mod encoder;
 mod error;
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 mod fixture;
 mod joint;
-pub mod make;
 mod num;
 #[cfg(feature = "parts")]
 #[doc(hidden)]
 pub mod parts;
 mod play;
 mod self_test;
+pub mod shared;
 mod store;
 mod table;
-mod telemetry;
+#[cfg(any(test, feature = "testing"))]
+#[doc(hidden)]
+pub mod testing;
 mod unit;
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 mod upset;
 mod whole;
 
@@ -253,12 +161,9 @@ pub use drive::{Drive, FixedMember, Phases};
 pub use encoder::{Encoder, EncoderError, EncoderSettings, EncoderState, EncoderWrap};
 pub use error::{DriveError, Field, ImageError};
 pub use joint::{
-    AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead,
-    Coefficient, Disturbance, Flags, Implausible, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque,
-    Measured, Mode, ModeError, MotionAhead, Noise, NominalOutput, Now, Output, OutputAhead, Overrun, PREDICTOR_PARTS,
-    Predictor, PredictorError, PredictorState, Readings, RestoreError, SAVED_JOINT_BYTES, Seen, SettingError, Slip,
-    SlipBank, SlipElement, SlipState, SlipVariable, StartUp, StartUpSettings, StartUpStep, Term, TorquePath,
-    TorqueReading, TorqueSettings, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
+    Adjustment, Aged, Flags, Implausible, Input, Joint, JointState, Limits, Mode, ModeError, MotionAhead, Output,
+    Overrun, Readings, RestoreError, SAVED_JOINT_BYTES, SettingError, StartUp, StartUpSettings, StartUpStep,
+    TorquePath, TorqueReading, TorqueSettings,
 };
 pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
 pub use self_test::{SelfTestError, self_test};
@@ -266,16 +171,10 @@ pub use store::{
     ActivateError, Activation, Counters, Health, Images, Progress, STORE_PAGES, STORE_WORDS, Store, Upload,
     UploadError, mend_page,
 };
-#[cfg(feature = "fuzzing")]
-#[doc(hidden)]
-pub use table::reseal;
 pub use table::{
     Approach, Bounds, Command, FORMAT_VERSION, GeneratorKind, INVERSE_TOLERANCE_RAD, Identity, IdentityCheck,
     MAX_ERROR_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
     OperatingPoint, PAGE_BYTES, Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError,
     grid, image_bytes, write_image,
-};
-pub use telemetry::{
-    Event, Events, Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Watch, Writer,
 };
 pub use unit::{Arcsec, Degrees, Rad};

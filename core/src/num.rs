@@ -1,12 +1,12 @@
 //! Small functions of numbers. Those of a step call no library and give the same bits on every machine.
 
 /// The larger of two numbers; the second if the first is NaN. (`f32::max` is a library call on a Cortex-M4F.)
-pub(crate) fn larger(a: f32, b: f32) -> f32 {
+pub fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// As [`larger`], in double precision.
-pub(crate) fn larger64(a: f64, b: f64) -> f64 {
+pub fn larger64(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
@@ -16,7 +16,7 @@ pub(crate) fn larger64(a: f64, b: f64) -> f64 {
 /// Square root: equal bits on every machine, and a tenth of the instructions that `libm` takes without a processor's
 /// own root.
 #[inline(always)]
-pub(crate) fn sqrt<const STEPS: usize>(x: f32) -> f32 {
+pub fn sqrt<const STEPS: usize>(x: f32) -> f32 {
     let bits = x.to_bits() & !((x.to_bits() as i32 >> 31) as u32);
     let x = f32::from_bits(bits);
     let mut inverse = f32::from_bits(0x5f37_59df_u32.wrapping_sub(bits >> 1));
@@ -29,18 +29,18 @@ pub(crate) fn sqrt<const STEPS: usize>(x: f32) -> f32 {
 
 /// `value` within a range; its lower end if NaN.
 #[inline(always)]
-pub(crate) fn within(value: f32, [least, most]: [f32; 2]) -> f32 {
+pub fn within(value: f32, [least, most]: [f32; 2]) -> f32 {
     let above = if value > least { value } else { least };
     if above < most { above } else { most }
 }
 
 /// Whether a number is finite.
 #[inline(always)]
-pub(crate) fn finite(value: f32) -> bool {
+pub fn finite(value: f32) -> bool {
     value.to_bits() & 0x7fff_ffff < 0x7f80_0000
 }
 
 /// Radians in counts.
-pub(crate) const fn counts(rad: f64) -> f64 {
+pub const fn counts(rad: f64) -> f64 {
     rad * (4_294_967_296.0 / core::f64::consts::TAU)
 }

@@ -37,7 +37,7 @@ impl Direction {
 }
 
 /// Largest half-width of a table in counts, 0.05 rad.
-pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
+pub const MAX_HALF_COUNTS: i32 = 34_178_720;
 /// Most that may be added to the mean or the half-width of a table, counts, 0.049 rad.
 pub(crate) const MAX_ADDED_COUNTS: i32 = (1 << 25) - 1;
 /// Largest half-width of a play in counts, 0.2 rad: far above any table with what may be added to it, far below
@@ -111,7 +111,8 @@ impl PlayState {
     }
 
     /// The same in counts, after the first update.
-    pub(crate) const fn offset_counts(&self) -> i32 {
+    #[must_use]
+    pub const fn offset_counts(&self) -> i32 {
         self.lower.wrapping_add(self.upper) >> 1
     }
 
@@ -197,7 +198,8 @@ impl PlayState {
 
     /// As [`Self::follow`]: the error.
     #[inline(always)]
-    pub(crate) const fn update(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> i32 {
+    #[doc(hidden)]
+    pub const fn update(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> i32 {
         let (error, _) = self.follow(nominal, centre, half, sane);
         error
     }
@@ -216,7 +218,8 @@ impl PlayState {
     /// The estimate of the centre changed, not the position of the drive in its play: the estimated output moves as
     /// far.
     #[inline(always)]
-    pub(crate) const fn shift(&mut self, counts: i32) {
+    #[doc(hidden)]
+    pub const fn shift(&mut self, counts: i32) {
         self.error = self.error.wrapping_add(counts & !(self.half >> 31));
     }
 
@@ -247,7 +250,7 @@ const fn clamped(offset: i32, half: i32) -> i32 {
     if above > half { half } else { above }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(PlayState { nominal, error, lower, upper, half });
 
 #[cfg(test)]

@@ -3,9 +3,9 @@
 //! ```
 //! use flexspline::{Arcsec, Degrees, OutputAngle, Rad};
 //!
-//! let hold_rad: f32 = Arcsec(0.2).rad(); // a field of `Limits`
+//! let deadband_rad: f32 = Arcsec(0.2).rad(); // a field of `Limits`
 //! let target = OutputAngle::of(Degrees(12.5)).ok_or("beyond 2^31 turns")?;
-//! assert!((target.to_rad() - Rad::from(Degrees(12.5)).0).abs() < 1e-9 && hold_rad > 9.6e-7);
+//! assert!((target.to_rad() - Rad::from(Degrees(12.5)).0).abs() < 1e-9 && deadband_rad > 9.6e-7);
 //! # Ok::<(), &str>(())
 //! ```
 

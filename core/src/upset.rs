@@ -3,11 +3,13 @@
 //!
 //! [`upsets!`] takes a structure apart without `..`, so a new field that is not listed does not compile.
 
+#![allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)] // Tests.
+
 use crate::angle::{GeneratorAngle, OutputAngle};
 use std::string::String;
 
 /// Something whose bits can flip.
-pub(crate) trait Upset {
+pub trait Upset {
     /// How many bits it has.
     fn bits(&self) -> usize;
     /// Flips one of them; adds the names on the way to it to the path.
@@ -124,45 +126,33 @@ impl<T: Upset, const N: usize> Upset for [T; N] {
     }
 }
 
+#[doc(hidden)]
+#[macro_export]
 macro_rules! upsets {
     ([$($generic:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
-        impl<$($generic)*> $crate::upset::Upset for $type {
+        #[allow(clippy::arithmetic_side_effects)] // Of bits below those of the whole.
+        impl<$($generic)*> $crate::testing::Upset for $type {
             fn bits(&self) -> usize {
                 let Self { $($field),* } = self;
-                [$($crate::upset::Upset::bits($field)),*].into_iter().sum()
+                [$($crate::testing::Upset::bits($field)),*].into_iter().sum()
             }
 
-            fn flip(&mut self, mut bit: usize, path: &mut std::string::String) {
+            fn flip(&mut self, mut bit: usize, path: &mut $crate::testing::String) {
                 let Self { $($field),* } = self;
                 $(
-                    if bit < $crate::upset::Upset::bits($field) {
+                    if bit < $crate::testing::Upset::bits($field) {
                         path.push('.');
                         path.push_str(stringify!($field));
-                        return $crate::upset::Upset::flip($field, bit, path);
+                        return $crate::testing::Upset::flip($field, bit, path);
                     }
-                    bit -= $crate::upset::Upset::bits($field);
+                    bit -= $crate::testing::Upset::bits($field);
                 )*
                 let _ = bit;
             }
         }
     };
     ($type:ty { $($field:ident),* $(,)? }) => {
-        $crate::upset::upsets!([] $type { $($field),* });
+        $crate::upsets!([] $type { $($field),* });
     };
 }
-pub(crate) use upsets;
-
-macro_rules! matrices {
-    ($($matrix:ident),*) => {$(
-        impl Upset for nalgebra::$matrix<f32> {
-            fn bits(&self) -> usize {
-                32 * self.len()
-            }
-
-            fn flip(&mut self, bit: usize, path: &mut String) {
-                self.as_mut_slice()[bit / 32].flip(bit % 32, path);
-            }
-        }
-    )*};
-}
-matrices!(Matrix4, Matrix4x2, Vector4, RowVector4);
+pub use upsets;

@@ -19,6 +19,8 @@
 //! survives what a value with two copies survives, as long as one word was hit, for 8 bytes instead of its own size.
 //! Anything else is reported and not used.
 
+use crate::angle::{GeneratorAngle, OutputAngle};
+
 /// The sums of words: so that a constant can be made of them, and nothing is a loop.
 macro_rules! sums {
     ($start:expr; $($word:expr),* $(,)?) => {{
@@ -67,17 +69,17 @@ pub(crate) const fn same([a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
 }
 
 /// The sum before the first word.
-pub(crate) const START: u64 = SUMS_START[0] as u64 | (SUMS_START[1] as u64) << 32;
+pub const START: u64 = SUMS_START[0] as u64 | (SUMS_START[1] as u64) << 32;
 
 /// A sum with one more word.
 #[inline(always)]
-pub(crate) const fn add(sum: u64, word: u32) -> u64 {
+pub const fn add(sum: u64, word: u32) -> u64 {
     // Fits: (2³² − 1)² + 2·(2³² − 1) = 2⁶⁴ − 1.
     (sum as u32 as u64).wrapping_mul(FACTOR as u64).wrapping_add(sum >> 32).wrapping_add(word as u64)
 }
 
 /// The sum of a few words, as a constant.
-pub(crate) const fn sum_of(mut words: &[u32]) -> u64 {
+pub const fn sum_of(mut words: &[u32]) -> u64 {
     let mut sum = START;
     while let [word, rest @ ..] = words {
         sum = add(sum, *word);
@@ -87,7 +89,7 @@ pub(crate) const fn sum_of(mut words: &[u32]) -> u64 {
 }
 
 /// Something that is kept as words under one sum.
-pub(crate) trait Words: Copy {
+pub trait Words: Copy {
     /// Goes on with a sum over its words, in order.
     fn sum(&self, sum: u64) -> u64;
     /// Shows every word in the same order, and takes what is to stand in its place.
@@ -126,6 +128,23 @@ impl Words for i64 {
     }
 }
 
+macro_rules! words_of_angles {
+    ($($angle:ty),*) => {$(
+        impl Words for $angle {
+            fn sum(&self, sum: u64) -> u64 {
+                self.counts().sum(sum)
+            }
+
+            fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
+                let mut counts = self.counts();
+                counts.each(see);
+                *self = Self::from_counts(counts);
+            }
+        }
+    )*};
+}
+words_of_angles!(GeneratorAngle, OutputAngle);
+
 impl<T: Words, const N: usize> Words for [T; N] {
     #[inline(always)]
     fn sum(&self, sum: u64) -> u64 {
@@ -139,24 +158,26 @@ impl<T: Words, const N: usize> Words for [T; N] {
 
 /// The words of a structure: those of its fields, in this order. Takes it apart without `..`, so that no field is left
 /// out.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! words {
     ([$($generic:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
-        impl<$($generic)*> $crate::whole::Words for $type {
+        impl<$($generic)*> $crate::shared::Words for $type {
             #[inline(always)]
             fn sum(&self, sum: u64) -> u64 {
                 let Self { $($field),* } = self;
-                $(let sum = $crate::whole::Words::sum($field, sum);)*
+                $(let sum = $crate::shared::Words::sum($field, sum);)*
                 sum
             }
 
             fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
                 let Self { $($field),* } = self;
-                $($crate::whole::Words::each($field, see);)*
+                $($crate::shared::Words::each($field, see);)*
             }
         }
     };
 }
-pub(crate) use words;
+pub use words;
 
 /// Most neighbouring bits of a word, or of the sum, of which a change is mended: cells that one particle flips lie next
 /// to each other. The bound is a guess. Each bit more doubles the number of changes that may be mistaken for one: 2¹³
@@ -190,19 +211,19 @@ const fn reduced(s: u64) -> u64 {
 
 /// A value under a sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Sealed<T> {
+pub struct Sealed<T> {
     kept: T,
     sums: [u32; 2],
 }
 
 impl<T> Sealed<T> {
     /// A value with its sum, for constants: that of all its words ([`sum_of`]).
-    pub(crate) const fn of(kept: T, sum: u64) -> Self {
+    pub const fn of(kept: T, sum: u64) -> Self {
         Self { kept, sums: pair(sum) }
     }
 
     /// The kept value, checked or not.
-    pub(crate) const fn kept(&self) -> &T {
+    pub const fn kept(&self) -> &T {
         &self.kept
     }
 }
@@ -210,7 +231,7 @@ impl<T> Sealed<T> {
 impl<T: Words> Sealed<T> {
     /// A value with its sum.
     #[inline(always)]
-    pub(crate) fn new(kept: T) -> Self {
+    pub fn new(kept: T) -> Self {
         Self { sums: pair(Self::found(&kept)), kept }
     }
 
@@ -221,25 +242,25 @@ impl<T: Words> Sealed<T> {
 
     /// Whether nothing changed since it was kept.
     #[inline(always)]
-    pub(crate) fn is_whole(&self) -> bool {
+    pub fn is_whole(&self) -> bool {
         same(pair(Self::found(&self.kept)), self.sums)
     }
 
     /// The kept value, mended if it has to be; `None` if it is lost.
     #[inline(always)]
-    pub(crate) fn open(&self) -> Option<T> {
+    pub fn open(&self) -> Option<T> {
         if self.is_whole() { Some(self.kept) } else { self.mended() }
     }
 
     /// Looks at what is kept, mended if it has to be; `None` if it is lost.
     #[inline(always)]
-    pub(crate) fn with<R>(&self, look: impl FnOnce(&T) -> R) -> Option<R> {
+    pub fn with<R>(&self, look: impl FnOnce(&T) -> R) -> Option<R> {
         if self.is_whole() { Some(look(&self.kept)) } else { self.mended().map(|kept| look(&kept)) }
     }
 
     /// Changes what is kept, where it lies, mended if it has to be; `None`, and nothing is changed, if it is lost.
     #[inline(always)]
-    pub(crate) fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> Option<R> {
+    pub fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> Option<R> {
         if !self.is_whole() {
             self.kept = self.mended()?;
         }
@@ -250,12 +271,12 @@ impl<T: Words> Sealed<T> {
 
     /// Keeps another value.
     #[inline(always)]
-    pub(crate) fn close(&mut self, kept: T) {
+    pub fn close(&mut self, kept: T) {
         *self = Self::new(kept);
     }
 
     /// Makes it whole; false if it is lost.
-    pub(crate) fn mend(&mut self) -> bool {
+    pub fn mend(&mut self) -> bool {
         let found = self.open();
         if let Some(kept) = found {
             self.close(kept);
@@ -292,18 +313,27 @@ impl<T: Words> Sealed<T> {
     }
 }
 
-#[cfg(test)]
-impl<T: crate::upset::Upset> crate::upset::Upset for Sealed<T> {
+#[cfg(any(test, feature = "testing"))]
+#[allow(clippy::arithmetic_side_effects)] // A shift by less than 32.
+impl<T: Words> crate::upset::Upset for Sealed<T> {
     fn bits(&self) -> usize {
-        let Self { kept, sums } = self;
-        kept.bits().wrapping_add(sums.bits())
+        let (mut kept, mut words) = (self.kept, 0usize);
+        kept.each(&mut |word| {
+            words = words.wrapping_add(1);
+            word
+        });
+        words.wrapping_mul(32).wrapping_add(self.sums.bits())
     }
 
-    fn flip(&mut self, bit: usize, path: &mut std::string::String) {
-        let Self { kept, sums } = self;
-        match bit.checked_sub(kept.bits()) {
-            None => kept.flip(bit, path),
-            Some(bit) => sums.flip(bit, path),
+    fn flip(&mut self, mut bit: usize, path: &mut std::string::String) {
+        self.kept.each(&mut |word| {
+            let flipped = if bit < 32 { word ^ 1 << bit } else { word };
+            bit = bit.wrapping_sub(32);
+            flipped
+        });
+        // Beyond the words it is one of the sum; within them it is below 0 now.
+        if bit < 64 {
+            self.sums.flip(bit, path);
         }
     }
 }

@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use flexspline::make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
-use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Inertias, Noise, Predictor, Provenance};
+use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Provenance};
+use flexspline_estimation::{Inertias, Noise, TwoMassObserver};
+use flexspline_make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
 
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets it"));
@@ -33,7 +34,7 @@ fn write_predictor(path: &Path) {
     let inertias =
         Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3.0e4, damping_n_m_s_per_rad: 20.0 };
     let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: Some(1e-6) };
-    let predictor = Predictor::new(inertias, noise, 1e-3).expect("it contracts");
+    let predictor = TwoMassObserver::new(inertias, noise, 1e-3).expect("it contracts");
     fs::write(path, format!("{:?}", predictor.parts())).expect("OUT_DIR is writable");
 }
 

@@ -62,7 +62,9 @@ impl Adjustment {
     }
 
     /// With these added; lost if it is.
-    pub(super) fn with(self, [more, wider, further]: [i32; 3]) -> Self {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with(self, [more, wider, further]: [i32; 3]) -> Self {
         let Some([mean, half_width, uncertainty]) = self.open() else { return Self::LOST };
         let sum = |one: i32, other: i32| within(one.saturating_add(other), Self::MAX_COUNTS.wrapping_neg());
         Self::of([sum(mean, more), sum(half_width, wider), sum(uncertainty, further)])
@@ -76,7 +78,9 @@ impl Adjustment {
 
     /// Mean, half-width and uncertainty, counts, mended if they have to be; `None` if it is lost.
     #[inline(always)]
-    pub(crate) fn open(&self) -> Option<[i32; 3]> {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn open(&self) -> Option<[i32; 3]> {
         self.counts.open()
     }
 
@@ -100,7 +104,7 @@ impl Adjustment {
 }
 
 /// An uncertainty in counts: what is no number, or none that can be, is the largest.
-pub(super) fn uncertainty_counts(rad: f32) -> i32 {
+pub fn uncertainty_counts(rad: f32) -> i32 {
     if (0.0..=Adjustment::MAX_RAD).contains(&rad) { counts_from_rad(rad) } else { Adjustment::MAX_COUNTS }
 }
 
@@ -112,10 +116,10 @@ const fn within(counts: i32, least: i32) -> i32 {
 
 /// An adjustment within its magnitude.
 #[inline(always)]
-pub(super) const fn bounded(counts: i32) -> i32 {
+pub const fn bounded(counts: i32) -> i32 {
     // From −2²⁵ on: one instruction.
     within(counts, !Adjustment::MAX_COUNTS)
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Adjustment { counts });

@@ -15,7 +15,7 @@ impl fmt::Display for SettingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} = {}: must be finite and above zero (hold_rad: or zero), and neither beyond what one tick can do nor \
+            "{} = {}: must be finite and above zero (deadband_rad: or zero), and neither beyond what one tick can do nor \
              too small to matter in it",
             self.name, self.found
         )
@@ -37,14 +37,14 @@ pub struct Limits {
     /// [`Joint::with_generator_acceleration`](crate::Joint::with_generator_acceleration).
     pub generator_rate_rad_s: f32,
     /// Ticks for which a glitch is not believed, and for which the last correction is kept where none can be made.
-    pub patience: u16,
+    pub debounce_ticks: u16,
     /// A target that is no further from the output than this is reached on the flank that bears already, rad; 0 for
     /// none.
     ///
     /// Else noise of the encoder, or of a target that stands, changes the flank to and fro, which crosses the whole
     /// play each time. It costs up to this much where a motion turns back by less. Some three times the peak of the
     /// noise at the output is enough.
-    pub hold_rad: f32,
+    pub deadband_rad: f32,
 }
 
 /// Least tick, s: no loop closes ten million times a second. A guess.

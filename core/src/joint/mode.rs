@@ -34,7 +34,8 @@ impl core::error::Error for ModeError {}
 
 impl Mode {
     /// As a number: of telemetry, of the C interface, of what is kept.
-    pub(crate) const fn code(self) -> u32 {
+    #[must_use]
+    pub const fn code(self) -> u32 {
         match self {
             Self::Off => 0,
             Self::Tracking => 1,
@@ -44,7 +45,8 @@ impl Mode {
     }
 
     /// From its number; safe for any that is none.
-    pub(crate) const fn from_code(code: u32) -> Self {
+    #[must_use]
+    pub const fn from_code(code: u32) -> Self {
         match code {
             0 => Self::Off,
             1 => Self::Tracking,

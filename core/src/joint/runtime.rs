@@ -9,9 +9,9 @@
 //! | what happens | what the joint does | flag |
 //! |---|---|---|
 //! | no sample | keeps the last angle and the play; the error is known to the table's limit | [`Flags::SAMPLE_LOST`] |
-//! | a sample too far off | ignores it; after `patience` ticks accepts it, play side unknown | [`Flags::GLITCH`] |
+//! | a sample too far off | ignores it; after `debounce_ticks` ticks accepts it, play side unknown | [`Flags::GLITCH`] |
 //! | a sample out and back | takes back what it did to the play, in the next tick | [`Flags::GLITCH`] |
-//! | input not finite, table in doubt | keeps it for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
+//! | input not finite, table in doubt | keeps it for `debounce_ticks` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
 //! | an adjustment that is not known | adds its uncertainty | [`Uncertain`](crate::Quality::Uncertain) |
 //! | an adjustment that is lost | as an input that is not finite | [`Flags::NOT_CORRECTED`] |
@@ -23,7 +23,7 @@
 //! | an upset in the state | takes the other copy, else safe mode | [`Flags::STATE_TORN`], [`Flags::SAFE`] |
 //! | an upset in the settings | takes the other copy, else commands the last sample or 0 | [`Flags::JOINT_TORN`] |
 //! | an upset in the table | repairs it and repeats the tick, else does not use it | [`Flags::TABLE_DOUBT`] |
-//! | a target nearer than `hold_rad` | is reached on the flank that bears already | |
+//! | a target nearer than `deadband_rad` | is reached on the flank that bears already | |
 //! | no sample since a reset | no new correction; the first is compared with a saved one | [`Flags::NOT_CORRECTED`] |
 //! | reset | [`JointState::restore`] goes on; [`JointState::new`] starts uncorrected, play side unknown | |
 
@@ -75,7 +75,7 @@ struct JointSettings {
     largest_bend: i32,
     spike: i32,
     tick_s: f32,
-    patience: u16,
+    debounce_ticks: u16,
     /// Ticks of a fade, and the part of the correction that one tick of it takes.
     fade: u16,
     fade_step: f32,
@@ -105,7 +105,7 @@ impl Joint {
     }
 
     /// With a largest acceleration of the generator, rad/s²: a sample that would need more is a glitch, and one that is
-    /// out and back within two ticks is taken back. A multiple of what motor and load can do; no less than `hold_rad`
+    /// out and back within two ticks is taken back. A multiple of what motor and load can do; no less than `deadband_rad`
     /// allows for noise.
     ///
     /// Without it a sample may need full speed in one tick, and one that is out and back a 64th of that in each.
@@ -255,7 +255,8 @@ impl Joint {
 
 impl JointSettings {
     const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
-        let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, patience, hold_rad } = limits;
+        let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, debounce_ticks, deadband_rad } =
+            limits;
         let tick = tick_s as f64;
         if let Err(error) = checked("tick_s", tick_s, tick, [LEAST_TICK_S, 1.0e3]) {
             return Err(error);
@@ -280,9 +281,9 @@ impl JointSettings {
             Ok(counts) => counts as i32,
             Err(error) => return Err(error),
         };
-        let hold = num::counts(hold_rad as f64);
-        if hold_rad != 0.0
-            && let Err(error) = checked("hold_rad", hold_rad, hold, [1.0, num::counts(0.05)])
+        let hold = num::counts(deadband_rad as f64);
+        if deadband_rad != 0.0
+            && let Err(error) = checked("deadband_rad", deadband_rad, hold, [1.0, num::counts(0.05)])
         {
             return Err(error);
         }
@@ -299,7 +300,7 @@ impl JointSettings {
         let rate = if rate < 1.0 { 1 } else { rate as i32 };
         let hold = hold as i32;
         // One tick more can still be counted.
-        let patience = if patience == u16::MAX { patience.wrapping_sub(1) } else { patience };
+        let debounce_ticks = if debounce_ticks == u16::MAX { debounce_ticks.wrapping_sub(1) } else { debounce_ticks };
         let settings = Self {
             drive,
             hold_late,
@@ -309,7 +310,7 @@ impl JointSettings {
             largest_bend: largest_move,
             spike: 0,
             tick_s,
-            patience,
+            debounce_ticks,
             fade,
             fade_step,
             hold,
@@ -354,7 +355,7 @@ impl JointSettings {
             self.largest_bend as u32,
             self.spike as u32,
             self.tick_s.to_bits(),
-            self.patience as u32 | (self.fade as u32) << 16,
+            self.debounce_ticks as u32 | (self.fade as u32) << 16,
             self.fade_step.to_bits(),
             self.hold as u32,
         )
@@ -496,9 +497,9 @@ impl JointSettings {
         let back = all(one_bend & self.spike.wrapping_sub(size) & straight & !wide);
         let bent = one_step & self.largest_bend.wrapping_sub(size);
         let far = all(far | bent) & !back;
-        let patience = self.patience as u32;
+        let debounce_ticks = self.debounce_ticks as u32;
         let glitches = (now.glitches as u32).wrapping_add(1) & far as u32;
-        let believed = all(patience.wrapping_sub(glitches) as i32);
+        let believed = all(debounce_ticks.wrapping_sub(glitches) as i32);
         now.glitches = (glitches & !believed as u32) as u16;
         let glitch = far & !believed;
         now.generator = sample.offset_counts((way & glitch as i64).wrapping_neg());
@@ -518,7 +519,7 @@ impl JointSettings {
         samples.step = step ^ (step ^ half_way) & back;
         samples.bend = bend & !back;
         // After too long without an answer of the table nobody followed the play.
-        let late = patience.wrapping_sub(now.uncorrected as u32) >> 31;
+        let late = debounce_ticks.wrapping_sub(now.uncorrected as u32) >> 31;
         let sampled = seen >> SAMPLED.trailing_zeros();
         if believed as u32 | sampled & late != 0 {
             // The play is not where it was thought.
@@ -537,7 +538,7 @@ impl JointSettings {
         let wanted = if sane { wanted.wrapping_mul(FINE) } else { kept };
         let mode = now.marks & MODE;
         // Off or safe: the two bits are the same.
-        let off = (now.uncorrected > self.patience) | ((mode ^ (mode >> 1)) & 1 == 0);
+        let off = (now.uncorrected > self.debounce_ticks) | ((mode ^ (mode >> 1)) & 1 == 0);
         let keep = (mode == Mode::Hold.code()) | (late & (self.hold_late != 0));
         let wanted = if off { 0 } else { wanted };
         let wanted = if keep { kept } else { wanted };
@@ -586,9 +587,9 @@ impl JointSettings {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Joint { copies });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(JointSettings {
     drive,
     hold_late,
@@ -598,7 +599,7 @@ crate::upset::upsets!(JointSettings {
     largest_bend,
     spike,
     tick_s,
-    patience,
+    debounce_ticks,
     fade,
     fade_step,
     hold,
@@ -1022,24 +1023,17 @@ mod tests {
     /// Every bit of joint and state between two ticks: what is asked of them then is what it was.
     #[test]
     fn no_single_bit_of_joint_or_state_changes_what_they_answer() {
-        use crate::joint::{Ahead, Inertias, Noise, Now, Predictor, PredictorState};
         let mut run = Loop::new(Overrun::SkipAndCount);
         run.run(300, 1e-3, 1e-5);
-        let inertias =
-            Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3e4, damping_n_m_s_per_rad: 20.0 };
-        let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: None };
-        let predictor = Predictor::new(inertias, noise, 1e-3).unwrap();
         let (store, target, generator) = (&run.store, run.input(5e-3).target, run.generator.offset_rad(0.01));
         let answers = |joint: &Joint, state: &JointState| {
             let mut play = *state.play();
-            let now = Now { generator, play: state.play(), measured: None, measured_bound_rad: 0.0 };
             let moving = Approach::Moving(crate::Direction::Backward);
             (
                 joint.forward(store, &mut play, generator, 5.0),
                 [moving, Approach::From(state.play())].map(|approach| joint.inverse(store, target, 5.0, approach)),
                 joint.rate_ahead(store, target, 0.01, 5.0, 4e-3),
                 joint.motion_ahead(store, target, [0.01, 0.1], 5.0, 4e-3),
-                predictor.output_ahead(joint, store, &PredictorState::new(), &Ahead::default(), &now),
                 (*joint.drive(), state.mode(), *state.play()),
             )
         };
@@ -1063,8 +1057,8 @@ mod tests {
         for bit in [0, state.bits() / 2 + 40] {
             state.flip(bit, &mut std::string::String::new());
         }
-        let (forward, inverse, rate, motion, ahead, _) = answers(&joint, &run.state);
-        assert!(joint.is_lost() && rate.is_nan() && motion.acceleration_rad_s2.is_nan() && ahead.bound_rad > 1e30);
+        let (forward, inverse, rate, motion, _) = answers(&joint, &run.state);
+        assert!(joint.is_lost() && rate.is_nan() && motion.acceleration_rad_s2.is_nan());
         assert!([forward.quality, inverse[0].quality, inverse[1].quality] == [Quality::Disabled; 3]);
         assert_eq!((state.mode(), *state.play()), (Mode::Safe, PlayState::unknown()));
     }
@@ -1387,7 +1381,7 @@ mod tests {
         assert_eq!(named(Limits { rate_rad_s: 1e-40, ..LIMITS }), "rate_rad_s");
         assert_eq!(named(Limits { acceleration_rad_s2: 1e-40, ..LIMITS }), "acceleration_rad_s2");
         assert_eq!(named(Limits { generator_rate_rad_s: 1e-40, ..LIMITS }), "generator_rate_rad_s");
-        assert_eq!(named(Limits { hold_rad: 1e-40, ..LIMITS }), "hold_rad");
+        assert_eq!(named(Limits { deadband_rad: 1e-40, ..LIMITS }), "deadband_rad");
         assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
     }
 

@@ -72,8 +72,8 @@ impl Flags {
     }
 
     /// From bits, those of no flag left out.
-    #[cfg(any(test, feature = "c-api"))]
-    pub(crate) const fn of_bits(bits: u16) -> Self {
+    #[must_use]
+    pub const fn of_bits(bits: u16) -> Self {
         Self(bits & !Self::AGAIN.0)
     }
 

@@ -11,8 +11,8 @@
 //! # const JOINT: Joint = {
 //! #     let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
 //! #     let limits = Limits {
-//! #         tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5,
-//! #         hold_rad: 1e-6,
+//! #         tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, debounce_ticks: 5,
+//! #         deadband_rad: 1e-6,
 //! #     };
 //! #     let Ok(joint) = Joint::new(drive, limits, Overrun::SkipAndCount) else { panic!() };
 //! #     joint
@@ -332,24 +332,8 @@ fn differs(
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(StartUp { test });
-#[cfg(test)]
-crate::upset::upsets!(SensorTest {
-    from,
-    way,
-    output_way,
-    output_error,
-    drag_n_m,
-    ticks,
-    tick,
-    generator,
-    output,
-    torque_n_m,
-    torque_sum,
-    torques,
-    marks
-});
 
 #[cfg(test)]
 mod tests {

@@ -215,14 +215,14 @@ impl fmt::Display for RestoreError {
 impl core::error::Error for RestoreError {}
 
 /// Table and joint that something saved belongs to.
-pub(crate) fn owner(joint: &Joint, store: &Store) -> [u32; 4] {
+pub fn owner(joint: &Joint, store: &Store) -> [u32; 4] {
     let [a, b, c, d, e, f, g, h] = store.id().0;
     let [turned, added] = joint.sums();
     [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]), turned, added]
 }
 
 /// Words of something saved behind its mark and its owner, which must be these.
-pub(super) fn opened(bytes: &[u8], mark: [u8; 4], owner: [u32; 4]) -> Result<impl FnMut() -> u32, RestoreError> {
+pub fn opened(bytes: &[u8], mark: [u8; 4], owner: [u32; 4]) -> Result<impl FnMut() -> u32, RestoreError> {
     let found = bytes.first_chunk::<4>().copied().unwrap_or_default();
     if found != mark {
         return Err(RestoreError::Version { found });
@@ -457,11 +457,11 @@ impl JointState {
 
 const _: () = assert!(size_of::<Kept>() == 64);
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(JointState { copies, missed_ticks });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(SealedState { kept, samples, sums });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Kept {
     play,
     adjusted,
@@ -474,5 +474,5 @@ crate::upset::upsets!(Kept {
     fading,
     marks,
 });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(LastSamples { step, bend, free });

@@ -285,10 +285,8 @@ impl PathState {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(TorquePath { path });
-#[cfg(test)]
-crate::upset::upsets!(PathState { set, behind, believed, doubted, settle, frozen, gap, marks });
 
 #[cfg(test)]
 mod tests {

@@ -282,9 +282,9 @@ impl Activation {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(ActivatedTable { source, id, images, filled, sums });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Activation {
     drive,
     temperature,

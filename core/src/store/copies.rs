@@ -53,7 +53,8 @@ pub(super) fn agreed<const N: usize>(first: [u32; N], second: [u32; N], doubt: &
     first
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
+#[allow(clippy::arithmetic_side_effects, clippy::indexing_slicing)] // Of a bit of the copy.
 impl crate::upset::Upset for Copied {
     fn bits(&self) -> usize {
         32 * self.0.len()

@@ -85,5 +85,5 @@ impl fmt::Display for ActivateError {
 
 impl core::error::Error for ActivateError {}
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes });

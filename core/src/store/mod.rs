@@ -518,24 +518,29 @@ impl Store {
         crate::upset::Upset::bits(&self.source)
     }
 
-    /// Whether everything but the counters is the same.
-    pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let rest = |store: &Self| (store.next, store.scrub.second, store.scrub.page, store.scrub.word, store.scrub.crc);
-        let (same_source, same_id) = (self.source == other.source, self.id == other.id);
-        let damaged = |store: &Self| (store.damaged.pages, store.damaged.again);
-        let same_rest = rest(self) == rest(other) && damaged(self) == damaged(other);
-        same_source && same_id && same_rest && self.first == other.first && self.second == other.second
-    }
-
     /// Flips one of them.
     pub(crate) fn flip_source(&mut self, bit: usize) {
         crate::upset::Upset::flip(&mut self.source, bit, &mut std::string::String::new());
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
+impl Store {
+    /// Whether everything but the counters is the same.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        let rest = |store: &Self| (store.next, store.scrub.second, store.scrub.page, store.scrub.word, store.scrub.crc);
+        let (same_source, same_id) = (self.source == other.source, self.id == other.id);
+        let damaged = |store: &Self| (store.damaged.pages, store.damaged.again);
+        let same_rest = rest(self) == rest(other) && damaged(self) == damaged(other);
+        same_source && same_id && same_rest && self.first == other.first && self.second == other.second
+    }
+}
+
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Store { first, second, source, next, scrub, damaged, counters, id });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Scrub { second, page, word, crc });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Damaged { pages, again });

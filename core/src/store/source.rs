@@ -278,7 +278,7 @@ impl SealedSource {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(ImageSource {
     plan,
     torque_range,
@@ -298,5 +298,5 @@ crate::upset::upsets!(ImageSource {
     seal,
     drive,
 });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(SealedSource { source, sums });

@@ -837,3 +837,16 @@ fn of_two_damaged_images_the_first_says_what_is_wrong() {
     let refused = Store::new().activate(&Images::new(&first, &second), &fixture::drive(), 20.0);
     assert_eq!(refused, Err(ActivateError::Image(ImageError::Magic)));
 }
+
+/// The store's data on the table is checked after everything that a tick reads of it: a flip within the tick is found
+/// in it.
+#[test]
+fn a_flip_within_a_tick_is_found_in_it() {
+    let world = active(20.0);
+    for bit in 0..world.source_bits() / 2 {
+        let mut store = world.clone();
+        let point = store.locate(5.0, 0, 0);
+        store.flip_source(bit);
+        assert!(point.doubt.none() && !store.table_status(&Images::new(&IMAGE, &TWIN)).whole, "{bit}");
+    }
+}

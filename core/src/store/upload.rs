@@ -97,14 +97,16 @@ impl<'b> Upload<'b> {
     }
 
     /// Goes on with an upload of which so much has come: for C, where no pointer is kept between calls.
-    #[cfg(any(test, feature = "c-api"))]
-    pub(crate) fn resume(buffer: &'b mut [u8], announced: usize, received: usize) -> Result<Self, UploadError> {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn resume(buffer: &'b mut [u8], announced: usize, received: usize) -> Result<Self, UploadError> {
         Self::begin(buffer, announced).map(|begun| Self { received, ..begun })
     }
 
     /// [`Self::finish`] of an upload of which so much has come.
-    #[cfg(any(test, feature = "c-api"))]
-    pub(crate) fn check(buffer: &'b [u8], announced: usize, received: usize) -> Result<Table<'b>, UploadError> {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn check(buffer: &'b [u8], announced: usize, received: usize) -> Result<Table<'b>, UploadError> {
         let found = buffer.len();
         let image = buffer.get(..announced).ok_or(UploadError::Buffer { announced, found })?;
         if received != announced {
@@ -119,10 +121,7 @@ impl<'b> Upload<'b> {
     /// [`UploadError::Incomplete`] or [`UploadError::Image`].
     pub fn finish(self) -> Result<Table<'b>, UploadError> {
         let announced = self.buffer.len();
-        if self.received != announced {
-            return Err(UploadError::Incomplete { announced, found: self.received });
-        }
-        Table::check(self.buffer).map_err(UploadError::Image)
+        Self::check(self.buffer, announced, self.received)
     }
 }
 

@@ -72,9 +72,9 @@ impl Bounds {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Bounds { error_rad, periodic_rad, slope, curve_slope, ripple_cells, rounding_rad });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(InverseBound { iterations, error_rad });
 
 #[cfg(test)]

@@ -119,7 +119,7 @@ impl PeriodicAxis {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(PeriodicAxis { nodes });
 
 /// A place on a clamped axis: between node `below` and node `above`.

@@ -86,7 +86,7 @@ impl PointPlan {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(PointPlan {
     ripple_nodes,
     ripple_unit,

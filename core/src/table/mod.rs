@@ -31,18 +31,19 @@ mod memory;
 mod model;
 mod point;
 mod read;
-pub(crate) mod windup;
+pub mod windup;
 mod words;
 
 pub use bounds::{Bounds, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS};
 pub use identity::{Identity, IdentityCheck};
-#[cfg(any(test, feature = "fuzzing"))]
+#[cfg(any(test, feature = "testing"))]
 pub use image::reseal;
 pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
-pub(crate) use image::{ImageCheck, MAX_AXIS_VALUE, NODE_WORDS, counted, page_intact, ripple_row, word};
+pub(crate) use image::{ImageCheck, NODE_WORDS, page_intact, ripple_row, word};
+pub use image::{MAX_AXIS_VALUE, counted};
 pub(crate) use memory::{Doubt, Memory, PointPlan};
 pub use model::{Approach, Command, Prediction};
 pub(crate) use model::{Estimate, TableModel, departure};

@@ -4,13 +4,13 @@
 //! jump D is linear, and each of its two nodes has the slope of its own side.
 //!
 //! Slopes come from the node values alone and linearly: [`Slopes`] is what the image writer stores and what the least
-//! squares of [`crate::make`] assumes; [`bend`] is what the control step and the least squares evaluate. A limiter
+//! squares of `flexspline-make` assumes; [`bend`] is what the control step and the least squares evaluate. A limiter
 //! against overshoot would not be linear; what a cubic can reach is bounded when a table is accepted instead.
 
 use super::grid::{self, MAX_CLAMPED_NODES};
 
 /// Most nodes that a slope depends on.
-pub(crate) const STENCIL: usize = 5;
+pub const STENCIL: usize = 5;
 /// Fewest nodes of a piece whose slopes are taken over the root of the torque.
 const ROOT_NODES: usize = STENCIL;
 /// Where the root is zero: this part of the first interval short of the piece.
@@ -19,14 +19,14 @@ const ROOT_ORIGIN: f64 = 0.25;
 /// Difference of a cubic from the straight line at `weight` of an interval of `width`, from its rise over the interval,
 /// its slope below and its slope above.
 #[inline(always)]
-pub(crate) fn bend(weight: f32, width: f32, [rise, below, above]: [f32; 3]) -> f32 {
+pub fn bend(weight: f32, width: f32, [rise, below, above]: [f32; 3]) -> f32 {
     let rest = 1.0 - weight;
     weight * rest * (rest * (width * below - rise) + weight * (rise - width * above))
 }
 
 /// The slope at a node as a sum over neighbouring nodes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct NodeSlope {
+pub struct NodeSlope {
     /// The first of the nodes.
     pub first: usize,
     /// Their weights, per N·m; 0 for those not needed.
@@ -41,7 +41,7 @@ impl NodeSlope {
 }
 
 /// The slopes at all nodes of a torque axis.
-pub(crate) struct Slopes {
+pub struct Slopes {
     nodes: [NodeSlope; MAX_CLAMPED_NODES],
 }
 

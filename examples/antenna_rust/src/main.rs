@@ -30,8 +30,8 @@ const JOINT: Joint = {
         rate_rad_s: 0.05,
         acceleration_rad_s2: 5.0,
         generator_rate_rad_s: 600.0,
-        patience: 5,
-        hold_rad: 0.0,
+        debounce_ticks: 5,
+        deadband_rad: 0.0,
     };
     let Ok(joint) = Joint::new(drive, limits, Overrun::FadeOut { ticks: 50 }) else { panic!() };
     joint

@@ -147,8 +147,8 @@ impl CompensationModel {
             rate_rad_s: values[CORRECTION_RATE_LIMIT] as f32,
             acceleration_rad_s2: values[CORRECTION_ACCELERATION_LIMIT] as f32,
             generator_rate_rad_s: values[GENERATOR_RATE_LIMIT] as f32,
-            patience: values[PATIENCE] as u16,
-            hold_rad: values[ANGLE_HOLD] as f32,
+            debounce_ticks: values[PATIENCE] as u16,
+            deadband_rad: values[ANGLE_HOLD] as f32,
         };
         let joint = Joint::new(*table.drive(), limits, Overrun::SkipAndCount)?;
         let path = TorquePath::new(TorqueSettings {

@@ -4,11 +4,11 @@ use core::f64::consts::TAU;
 use std::panic::resume_unwind;
 use std::thread::ScopedJoinHandle;
 
-use flexspline::make::ProjectError;
 use flexspline::{
     ActivateError, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality, SettingError, Store,
     Table, TorqueReading, TorqueSettings,
 };
+use flexspline_make::ProjectError;
 
 use super::friction::Friction;
 use super::gear::{Gear, GearLine, SampledSpring, Spring};
@@ -238,8 +238,8 @@ impl LaneParts {
                 rate_rad_s: RATE_RAD_S as f32,
                 acceleration_rad_s2: ACCELERATION_RAD_S2 as f32,
                 generator_rate_rad_s: 600.0,
-                patience: 5,
-                hold_rad: HOLD_RAD,
+                debounce_ticks: 5,
+                deadband_rad: HOLD_RAD,
             },
             torque: TorqueSettings {
                 tick_s,

@@ -135,8 +135,8 @@ impl OnBoardSettings {
             l.rate_rad_s,
             l.acceleration_rad_s2,
             l.generator_rate_rad_s,
-            f32::from(l.patience),
-            l.hold_rad,
+            f32::from(l.debounce_ticks),
+            l.deadband_rad,
             t.bandwidth_hz,
             t.drag_n_m,
             t.table_drag_n_m,
@@ -164,8 +164,8 @@ impl OnBoardSettings {
             rate_rad_s: next(),
             acceleration_rad_s2: next(),
             generator_rate_rad_s: next(),
-            patience: next() as u16,
-            hold_rad: next(),
+            debounce_ticks: next() as u16,
+            deadband_rad: next(),
         };
         let torque = TorqueSettings {
             tick_s: limits.tick_s,

@@ -3,10 +3,10 @@
 
 use core::f64::consts::TAU;
 
-use flexspline::make::{
+use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, MAX_ERROR_RAD, Provenance, Table};
+use flexspline_make::{
     Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, ProjectError, Sample, Workspace, make_image,
 };
-use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, MAX_ERROR_RAD, Provenance, Table};
 
 use super::gear::{Gear, GearLine, SampledSpring, Spring};
 use super::noise::NoiseSource;

@@ -30,8 +30,8 @@ fn through(acceleration_rad_s2: f32, bandwidth_hz: Option<f32>) -> [f64; 2] {
         rate_rad_s: 0.05,
         acceleration_rad_s2,
         generator_rate_rad_s: 600.0,
-        patience: 5,
-        hold_rad: 5e-6,
+        debounce_ticks: 5,
+        deadband_rad: 5e-6,
     };
     let joint = Joint::new(drive, limits, Overrun::SkipAndCount).unwrap();
     let mut path = bandwidth_hz.map(|bandwidth_hz| {

@@ -30,7 +30,8 @@ pub static TABLES: [(&str, [&[u8]; 2]); 4] = [
 ];
 
 /// Two inertias, discretised on the host.
-pub static PREDICTOR: [f32; flexspline::PREDICTOR_PARTS] = include!(concat!(env!("OUT_DIR"), "/predictor.rs"));
+pub static PREDICTOR: [f32; flexspline_estimation::PREDICTOR_PARTS] =
+    include!(concat!(env!("OUT_DIR"), "/predictor.rs"));
 
 /// Prints through semihosting, for a [`core::fmt::Write`].
 pub struct Console;

@@ -321,12 +321,12 @@ impl<W: Write> Vectors<W> {
             rate_rad_s: decade(-4.0, 0.6),
             acceleration_rad_s2: decade(-3.0, 4.0),
             generator_rate_rad_s: decade(0.0, 2.4),
-            patience: 0,
-            hold_rad: decade(-8.0, -4.0),
+            debounce_ticks: 0,
+            deadband_rad: decade(-8.0, -4.0),
         };
         let number = mixed.number();
-        limits.patience = if number & 7 == 0 { (number >> 8) as u16 } else { (number >> 8 & 15) as u16 };
-        limits.hold_rad = if number & 0x30 == 0 { 0.0 } else { limits.hold_rad };
+        limits.debounce_ticks = if number & 7 == 0 { (number >> 8) as u16 } else { (number >> 8 & 15) as u16 };
+        limits.deadband_rad = if number & 0x30 == 0 { 0.0 } else { limits.deadband_rad };
         if number & 0xc0 == 0 {
             let bad =
                 [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-40, 1e-9, 1e12, -0.0, f32::from_bits((number >> 16) as u32)];
@@ -336,7 +336,7 @@ impl<W: Write> Vectors<W> {
                 1 => limits.rate_rad_s = found,
                 2 => limits.acceleration_rad_s2 = found,
                 3 => limits.generator_rate_rad_s = found,
-                _ => limits.hold_rad = found,
+                _ => limits.deadband_rad = found,
             }
         }
         let ticks = if number >> 33 & 7 == 0 { (number >> 36) as u16 } else { (number >> 36 & 31) as u16 };
@@ -346,12 +346,13 @@ impl<W: Write> Vectors<W> {
         let made = Joint::new(*table.drive(), limits, overrun);
         // Which the reader in C99 does not limit.
         let made = made.map(|joint| joint.with_generator_acceleration(1e30).expect("more than any generator's"));
-        let names = ["tick_s", "rate_rad_s", "acceleration_rad_s2", "generator_rate_rad_s", "hold_rad"];
+        let names = ["tick_s", "rate_rad_s", "acceleration_rad_s2", "generator_rate_rad_s", "deadband_rad"];
         let refused = made.as_ref().err().map(|error| names.iter().position(|&name| name == error.name));
         self.out.write_all(&[4])?;
-        let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, hold_rad, patience } = limits;
-        self.numbers(&[tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, hold_rad])?;
-        self.words(&[u32::from(patience) | u32::from(ticks) << 16, code.min(2) as u32])?;
+        let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, deadband_rad, debounce_ticks } =
+            limits;
+        self.numbers(&[tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, deadband_rad])?;
+        self.words(&[u32::from(debounce_ticks) | u32::from(ticks) << 16, code.min(2) as u32])?;
         self.out.write_all(&[refused.map_or(0, |at| at.expect("a setting of these") as u8 + 1)])?;
         Ok(made.ok())
     }
@@ -558,7 +559,7 @@ fn moved(base: &[u8], [kind, split, sign]: [usize; 3], part: f64) -> Vec<u8> {
             image[at..at + 4].copy_from_slice(&value.to_le_bytes());
         }
     }
-    flexspline::reseal(&mut image);
+    flexspline::testing::reseal(&mut image);
     image
 }
 
@@ -579,7 +580,7 @@ fn jump_at_the_end(base: &[u8]) -> Vec<u8> {
         image[last - 4] |= 1;
         image[last + 8] &= !1;
     }
-    flexspline::reseal(&mut image);
+    flexspline::testing::reseal(&mut image);
     image
 }
 
@@ -626,7 +627,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // A flexspline without teeth.
     let mut toothless = tables::BASES[2].clone();
     toothless[106..108].fill(0);
-    flexspline::reseal(&mut toothless);
+    flexspline::testing::reseal(&mut toothless);
     vectors.image(&toothless)?;
     for _ in 0..ticks / 40 {
         vectors.encoder(40, &mut mixed)?;

@@ -5,7 +5,7 @@
 
 use crate::Choices;
 use crate::tables::BASES;
-use flexspline::c_api as c;
+use flexspline_c as c;
 use std::mem::{align_of, size_of};
 use std::ptr::{null, null_mut};
 
@@ -63,43 +63,43 @@ type Object = *mut u64;
 
 // As C calls them: pointers to structures of its own.
 unsafe fn flexspline_store_init(store: Object) -> u32 {
-    flexspline::c_api::flexspline_store_init(store.cast()) as u32
+    flexspline_c::flexspline_store_init(store.cast()) as u32
 }
 unsafe fn flexspline_joint_init(joint: Object, settings: *const Settings) -> u32 {
-    flexspline::c_api::flexspline_joint_init(joint.cast(), settings.cast()) as u32
+    flexspline_c::flexspline_joint_init(joint.cast(), settings.cast()) as u32
 }
 unsafe fn flexspline_state_init(state: Object) -> u32 {
-    flexspline::c_api::flexspline_state_init(state.cast()) as u32
+    flexspline_c::flexspline_state_init(state.cast()) as u32
 }
 unsafe fn flexspline_store_activate(store: Object, joint: Object, table: *const Images, temperature_c: f32) -> u32 {
-    flexspline::c_api::flexspline_store_activate(store.cast(), joint.cast(), table.cast(), temperature_c) as u32
+    flexspline_c::flexspline_store_activate(store.cast(), joint.cast(), table.cast(), temperature_c) as u32
 }
 unsafe fn flexspline_store_set_temperature(store: Object, table: *const Images, temperature_c: f32) -> u32 {
-    flexspline::c_api::flexspline_store_set_temperature(store.cast(), table.cast(), temperature_c) as u32
+    flexspline_c::flexspline_store_set_temperature(store.cast(), table.cast(), temperature_c) as u32
 }
 unsafe fn flexspline_store_check_images(store: Object, table: *const Images, words: u16) -> u32 {
-    flexspline::c_api::flexspline_store_check_images(store.cast(), table.cast(), words) as u32
+    flexspline_c::flexspline_store_check_images(store.cast(), table.cast(), words) as u32
 }
 unsafe fn flexspline_state_request(state: Object, mode: u8) -> u32 {
-    flexspline::c_api::flexspline_state_request(state.cast(), mode) as u32
+    flexspline_c::flexspline_state_request(state.cast(), mode) as u32
 }
 unsafe fn flexspline_state_save(state: Object, joint: Object, store: Object, saved: *mut u8) -> u32 {
-    flexspline::c_api::flexspline_state_save(state.cast(), joint.cast(), store.cast(), saved.cast()) as u32
+    flexspline_c::flexspline_state_save(state.cast(), joint.cast(), store.cast(), saved.cast()) as u32
 }
 unsafe fn flexspline_state_restore(state: Object, joint: Object, store: Object, saved: *const u8) -> u32 {
-    flexspline::c_api::flexspline_state_restore(state.cast(), joint.cast(), store.cast(), saved.cast()) as u32
+    flexspline_c::flexspline_state_restore(state.cast(), joint.cast(), store.cast(), saved.cast()) as u32
 }
 unsafe fn flexspline_state_forget_side(state: Object) -> u32 {
-    flexspline::c_api::flexspline_state_forget_side(state.cast()) as u32
+    flexspline_c::flexspline_state_forget_side(state.cast()) as u32
 }
 unsafe fn flexspline_joint_mend(joint: Object) -> u32 {
-    flexspline::c_api::flexspline_joint_mend(joint.cast()) as u32
+    flexspline_c::flexspline_joint_mend(joint.cast()) as u32
 }
 unsafe fn flexspline_state_report(state: Object, report: Object) -> u32 {
-    flexspline::c_api::flexspline_state_report(state.cast(), report.cast()) as u32
+    flexspline_c::flexspline_state_report(state.cast(), report.cast()) as u32
 }
 unsafe fn flexspline_store_report(store: Object, report: Object) -> u32 {
-    flexspline::c_api::flexspline_store_report(store.cast(), report.cast()) as u32
+    flexspline_c::flexspline_store_report(store.cast(), report.cast()) as u32
 }
 unsafe fn flexspline_tick(
     joint: Object,
@@ -109,14 +109,8 @@ unsafe fn flexspline_tick(
     input: *const Input,
     output: *mut Output,
 ) -> u32 {
-    flexspline::c_api::flexspline_tick(
-        joint.cast(),
-        table.cast(),
-        store.cast(),
-        state.cast(),
-        input.cast(),
-        output.cast(),
-    ) as u32
+    flexspline_c::flexspline_tick(joint.cast(), table.cast(), store.cast(), state.cast(), input.cast(), output.cast())
+        as u32
 }
 
 const OK: u32 = 0;

@@ -19,8 +19,8 @@ pub fn any_joint(drive: Drive, choices: &mut Choices<'_>) -> Result<(Joint, Watc
             rate_rad_s: choices.wild(),
             acceleration_rad_s2: choices.wild(),
             generator_rate_rad_s: choices.wild(),
-            patience: choices.any(),
-            hold_rad: choices.wild(),
+            debounce_ticks: choices.any(),
+            deadband_rad: choices.wild(),
         }
     } else {
         let decade = |choices: &mut Choices<'_>, least: i32, most: i32| {
@@ -31,8 +31,8 @@ pub fn any_joint(drive: Drive, choices: &mut Choices<'_>) -> Result<(Joint, Watc
             rate_rad_s: decade(choices, -5, 0),
             acceleration_rad_s2: decade(choices, -4, 5),
             generator_rate_rad_s: decade(choices, 0, 3).min(100.0),
-            patience: choices.below(8) as u16,
-            hold_rad: if choices.any() { 1e-6 } else { 0.0 },
+            debounce_ticks: choices.below(8) as u16,
+            deadband_rad: if choices.any() { 1e-6 } else { 0.0 },
         }
     };
     let overrun = match choices.below(4) {

@@ -32,8 +32,8 @@ pub fn run(data: &[u8]) {
         rate_rad_s: 5.0,
         acceleration_rad_s2: 5e3,
         generator_rate_rad_s: 600.0,
-        patience: 3,
-        hold_rad: 1e-6,
+        debounce_ticks: 3,
+        deadband_rad: 1e-6,
     };
     let joint = Joint::new(drive, limits, Overrun::SkipAndCount).expect("limits of a joint");
     let flips = [Flips::OneSide, Flips::OtherPages, Flips::Anything][choices.below(3)];

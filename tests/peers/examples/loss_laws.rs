@@ -5,7 +5,7 @@
 //! fitted to all large cycles but the last, by least squares over the same curve of the torque (1, T, T |T|, T³), and
 //! tell the last and the small ones, from one run through the whole record:
 //!
-//! - springs that slip (Maxwell; `SlipBank` of the core): the angle lags by what
+//! - springs that slip (Maxwell; `MaxwellSlip` of the core): the angle lags by what
 //!   `zᵢ ← clamp(zᵢ + ΔT, −wᵢ, wᵢ)` hold, `wᵢ` at fixed shares of the largest torque;
 //! - a loss that follows the load (mujoco issue 3528, fitted there to strain wave drives):
 //!   `ż = (ω − |ω| z)/h`, `τ = µ_avg |T| z + µ_dif T z²` and viscous, over a spring; `h` is searched for.

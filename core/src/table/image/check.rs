@@ -846,9 +846,9 @@ impl<'a> Table<'a> {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(ImageCheck { stage, at, within, crc, facts, before, highest, most, least });
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(ImageFacts {
     body_bytes,
     drive,

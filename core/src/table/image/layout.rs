@@ -31,7 +31,7 @@ pub(super) const CRC_BYTES: usize = 4;
 pub(crate) const ID_OFFSET: usize = 48;
 pub(super) const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
-pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
+pub const MAX_AXIS_VALUE: f32 = 1e6;
 
 /// Where a step finds things in an image, in words; the layout is described in [`image`](super).
 pub(crate) mod word {
@@ -115,7 +115,7 @@ impl ImageLayout {
     }
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(ImageLayout { curves, nodes, node_plane, records, record, end });
 
 /// Width of a cell of the ripple at the output, counts.
@@ -135,7 +135,8 @@ pub(super) fn limit_counts(limit_rad: f32) -> u32 {
     (num::counts(limit_rad as f64) * 1.001 + 16.0) as u32
 }
 
-pub(crate) fn counted(field: Field, found: usize, least: usize, most: usize) -> Result<u8, ImageError> {
+/// A number of nodes as an image keeps it; 0 is allowed for what is periodic.
+pub fn counted(field: Field, found: usize, least: usize, most: usize) -> Result<u8, ImageError> {
     let optional = least == MIN_PERIODIC_NODES && found == 0;
     if optional || (least..=most).contains(&found) {
         Ok(found as u8)

@@ -68,10 +68,11 @@ pub(crate) use check::ImageCheck;
 pub(crate) use header::Laid;
 pub(crate) use layout::ID_OFFSET;
 pub use layout::{
-    FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, TEXT_BYTES, image_bytes,
+    FORMAT_VERSION, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, TEXT_BYTES,
+    counted, image_bytes,
 };
-pub(crate) use layout::{MAX_AXIS_VALUE, NODE_WORDS, counted, ripple_row, word};
+pub(crate) use layout::{NODE_WORDS, ripple_row, word};
 pub(crate) use sums::page_intact;
-#[cfg(any(test, feature = "fuzzing"))]
+#[cfg(any(test, feature = "testing"))]
 pub use write::reseal;
 pub use write::{Provenance, TableData, WriteError, write_image};

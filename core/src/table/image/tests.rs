@@ -143,7 +143,10 @@ fn a_half_width_that_touches_zero_stays_writable() {
 fn the_stated_sizes_hold() {
     assert_eq!(image_bytes(25, 3, 8, [32; 3]), 5556);
     assert_eq!(image_bytes(60, 2, 8, [0; 3]), 7872);
-    assert_eq!(fixture::image(false).len(), fixture::plan(false).image_bytes());
+    assert_eq!(
+        fixture::image(false).len(),
+        image_bytes(fixture::TORQUES.len(), fixture::TEMPERATURES.len(), 16, [0; 3])
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Writing an image: numbers become counts and units, and what is written is checked as a reader does.
 
-#[cfg(any(test, feature = "fuzzing"))]
+#[cfg(any(test, feature = "testing"))]
 use super::layout::word;
 use super::layout::{
     AXIS_SLOTS, BYTE_ORDER_MARK, DERIVED_WORDS, FORMAT_VERSION, ID_OFFSET, ImageLayout, MAGIC, MAX_RIPPLE_NODES,
@@ -13,7 +13,7 @@ use crate::error::{Field, ImageError};
 use crate::num::{self, larger64};
 use crate::table::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
 use crate::table::windup::Slopes;
-#[cfg(any(test, feature = "fuzzing"))]
+#[cfg(any(test, feature = "testing"))]
 use crate::table::word_at;
 use crate::table::{GeneratorKind, Table};
 use core::fmt;
@@ -51,7 +51,7 @@ pub struct TableData<'a> {
     pub temperature_nodes_c: &'a [f32],
     /// Nodes over one tooth pitch; 0 for no ripple.
     pub ripple_nodes: usize,
-    /// D, `[temperature][torque]`; its slopes follow from it ([`crate::make`]).
+    /// D, `[temperature][torque]`; its slopes follow from it (`flexspline-make`).
     pub mean_rad: &'a [f32],
     /// H, `[temperature][torque]`, ≥ 0.
     pub half_width_rad: &'a [f32],
@@ -334,7 +334,7 @@ pub(super) fn complete(image: &mut [u8], body_bytes: usize) -> Result<(), ImageE
 }
 
 /// Makes every checksum of an image right that states its body, whatever is in it.
-#[cfg(any(test, feature = "fuzzing"))]
+#[cfg(any(test, feature = "testing"))]
 #[doc(hidden)]
 pub fn reseal(image: &mut [u8]) {
     let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize;

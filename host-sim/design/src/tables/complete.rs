@@ -11,7 +11,7 @@
 //! softer unit winds up `1 / (1 - s)` times as far, so that the table may be off by `s / (1 - s)` of its wind-up.
 //!
 //! The loss is the width of the loop at no load after the largest torque either way. What the clearance of the FEM does
-//! not have of it becomes springs that slip with the torque (Iwan 1966; [`flexspline::SlipBank`]), which take back part
+//! not have of it becomes springs that slip with the torque (Iwan 1966; `MaxwellSlip` of flexspline-estimation), which take back part
 //! of the wind-up after each reversal.
 
 use flexspline::Table;
@@ -244,7 +244,7 @@ impl MissingSpring {
     }
 }
 
-/// A spring that slips with the load torque, as [`flexspline::TorqueSlipElement`] has it.
+/// A spring that slips with the load torque, as `TorqueSlipElement` of flexspline-estimation has it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlipSpring {
     /// Torque from its middle at which it slips, N m.
@@ -268,7 +268,7 @@ pub struct Completed {
     pub spring: MissingSpring,
     /// Uncertainty of the table at its largest torque with this scatter of units, ± arcsec: s / (1 - s) of wind-up.
     pub uncertainty_arcsec: f64,
-    /// Springs that slip, for the loss: settings of the core's `SlipBank`, beside the table. None where the sheet
+    /// Springs that slip, for the loss: settings of the core's `MaxwellSlip`, beside the table. None where the sheet
     /// states no loss, or the clearance of the FEM has it all.
     pub slip: Vec<SlipSpring>,
 }
@@ -314,7 +314,7 @@ impl Completed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flexspline::{SlipBank, SlipState, TorqueSlipElement};
+    use flexspline_estimation::{MaxwellSlip, SlipState, TorqueSlipElement};
 
     fn sheet(loss_arcmin: Option<f64>) -> SheetStiffness {
         let stated = crate::catalogue::sheet("CSF", 25.0, 100).unwrap();
@@ -375,7 +375,7 @@ mod tests {
             width_n_m: springs[k].width_n_m as f32,
             gain_rad_per_n_m: springs[k].gain_rad_per_n_m as f32,
         });
-        let bank = SlipBank::of_torque(elements).unwrap();
+        let bank = MaxwellSlip::of_torque(elements).unwrap();
         let mut state = SlipState::relaxed();
         let mut after = |torque: f32| {
             bank.update(&mut state, torque);

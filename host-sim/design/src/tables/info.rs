@@ -1,6 +1,6 @@
 //! A finished table and what is said about it in JSON.
 
-use flexspline::make::Sample;
+use flexspline_make::Sample;
 use serde::Serialize;
 
 use super::complete::Completed;

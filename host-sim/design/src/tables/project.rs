@@ -1,10 +1,10 @@
 //! From samples to the table image that firmware reads.
 //!
-//! The projection itself is the core's ([`flexspline::make`]), the same code on the host and on board. Here its plan is
+//! The projection itself is the core's ([`flexspline_make`]), the same code on the host and on board. Here its plan is
 //! laid: which nodes, which harmonics the samples can distinguish, and where the table came from.
 
-use flexspline::make::{Harmonics, MissingDirection, Plan, ProjectError, Sample, Workspace, make_image};
 use flexspline::{FixedMember, MAX_RIPPLE_NODES, Provenance, Table};
+use flexspline_make::{Harmonics, MissingDirection, Plan, ProjectError, Sample, Workspace, make_image};
 use thiserror::Error;
 
 use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
@@ -182,7 +182,7 @@ fn fem_plan<'a>(drive: &Drive, plan: &'a SweepPlan) -> Result<Plan<'a>, TableErr
 /// Orders, on as many nodes as the highest needs.
 fn harmonics_of(orders: &'static [u16]) -> Harmonics<'static> {
     let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
-    Harmonics { orders, nodes: flexspline::make::NODES_PER_PERIOD * highest }
+    Harmonics { orders, nodes: flexspline_make::NODES_PER_PERIOD * highest }
 }
 
 /// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many

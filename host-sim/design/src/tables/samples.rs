@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use flexspline::Direction;
-use flexspline::make::Sample;
+use flexspline_make::Sample;
 use thiserror::Error;
 
 use flexspline_base::csv_rows::{self, TableProblem};

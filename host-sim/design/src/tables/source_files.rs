@@ -20,7 +20,7 @@ pub fn rust_source(table: &MadeTable) -> String {
         let _ = writeln!(
             text,
             "\n/// Springs that slip, for the loss of the data sheet: width in N m and gain in rad/(N m), for \
-             `flexspline::SlipBank::of_torque`.\npub const {name}_SLIP: [(f32, f32); {}] = [",
+             `flexspline_estimation::MaxwellSlip::of_torque`.\npub const {name}_SLIP: [(f32, f32); {}] = [",
             slip_of(table).len()
         );
         slip_of(table).iter().for_each(|s| {

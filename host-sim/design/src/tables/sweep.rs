@@ -12,7 +12,7 @@
 use std::ops::ControlFlow;
 
 use flexspline::Direction;
-use flexspline::make::Sample;
+use flexspline_make::Sample;
 
 use rayon::prelude::*;
 

@@ -25,8 +25,8 @@
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
-use flexspline::make::Sample;
 use flexspline_algebra::{Mat, cholesky, product};
+use flexspline_make::Sample;
 use rayon::prelude::*;
 
 use super::project::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};

@@ -143,9 +143,9 @@ impl Places {
         let folder = std::path::absolute(&folder).unwrap_or(folder);
         // Without an operating system the library is one piece with no panic path; with one it has the panic handler of
         // the standard library.
-        let (features, lto) = if target.contains("-none-") { ("c-api", "fat") } else { ("c-api,std", "off") };
+        let lto = if target.contains("-none-") { "fat" } else { "off" };
         let output = Command::new("cargo")
-            .args(["rustc", "--release", "-p", "flexspline", "--features", features, "--target", target])
+            .args(["rustc", "--release", "-p", "flexspline-c", "--target", target])
             .args(["--crate-type", "staticlib", "--target-dir"])
             .arg(&folder)
             .envs([("CARGO_PROFILE_RELEASE_PANIC", "abort"), ("CARGO_PROFILE_RELEASE_LTO", lto)])
@@ -160,7 +160,7 @@ impl Places {
             let last = said.lines().rev().take(12).collect::<Vec<_>>();
             return Err(failed(last.into_iter().rev().collect::<Vec<_>>().join("\n")));
         }
-        read(target, &folder.join(target).join("release").join(ARCHIVE))
+        read(target, &folder.join(target).join("release").join("libflexspline_c.a"))
     }
 }
 

@@ -24,8 +24,8 @@ mod table;
 mod together;
 mod zero;
 
-use flexspline::make::ProjectError;
 use flexspline::{ImageError, Table, WriteError};
+use flexspline_make::ProjectError;
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use flexspline::grid::{MAX_CLAMPED_NODES, jump_intervals};
-use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 use flexspline::{Direction, GeneratorAngle, Table};
+use flexspline_make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 
 use super::parts::{GENERATOR_ORDERS, OUTPUT_ORDERS, PartName, State, TOOTH_ORDERS};
 use super::prior::Prior;

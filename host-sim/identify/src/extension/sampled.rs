@@ -3,8 +3,8 @@
 
 use std::f64::consts::TAU;
 
-use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 use flexspline::{Direction, Table};
+use flexspline_make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 
 use super::model::{CauseEntry, Model};
 use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER, ParameterName};

@@ -8,10 +8,10 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{
-    Activation, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint, JointState, Measured,
-    Mode, OperatingPoint, Output, OutputAngle, PlayState, Prediction, Predictor, PredictorState, Progress, Store,
-    parts, self_test,
+    Activation, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint, JointState, Mode,
+    OperatingPoint, Output, OutputAngle, PlayState, Prediction, Progress, Store, parts, self_test,
 };
+use flexspline_estimation::{Measured, PredictorState, TwoMassObserver};
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
 use flexspline_firmware::{PREDICTOR, TABLES, finish, twice};
@@ -68,13 +68,13 @@ fn solve(joint: &Joint, store: &Store, point: &OperatingPoint, target: OutputAng
 }
 
 #[inline(never)]
-fn observe(predictor: &Predictor, state: &mut PredictorState, measured: &Measured) {
+fn observe(predictor: &TwoMassObserver, state: &mut PredictorState, measured: &Measured) {
     predictor.step(state, measured);
 }
 
 /// Counts of the observer.
 fn measure_observer(counter: &Counter) -> Option<Range> {
-    let predictor = Predictor::from_parts(&PREDICTOR).ok()?;
+    let predictor = TwoMassObserver::from_parts(&PREDICTOR).ok()?;
     let (mut state, mut mixed, mut range) = (PredictorState::new(), Mixed(3), Range::default());
     for _ in 0..INPUTS {
         let measured =

@@ -8,7 +8,8 @@
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
-use flexspline::{Disturbance, Images, JointState, Measured, Mode, PlayState, Predictor, PredictorState, Store};
+use flexspline::{Images, JointState, Mode, PlayState, Store};
+use flexspline_estimation::{Disturbance, Measured, PredictorState, TwoMassObserver};
 use flexspline_firmware::trajectory::{JOINT, Trajectory};
 use flexspline_firmware::{PREDICTOR, TABLES, finish};
 
@@ -16,8 +17,8 @@ const TICKS: u32 = 2000;
 
 /// A call of its own: its matrices are not on the stack while the table is checked.
 #[inline(never)]
-fn predictor() -> Option<Predictor> {
-    Predictor::from_parts(&PREDICTOR).ok()
+fn predictor() -> Option<TwoMassObserver> {
+    TwoMassObserver::from_parts(&PREDICTOR).ok()
 }
 
 /// A call of its own: what it makes is on the stack only until it lies in its place.

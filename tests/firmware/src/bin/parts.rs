@@ -8,13 +8,17 @@ use core::num::NonZeroU32;
 
 use cortex_m_rt::entry;
 use flexspline::{
-    AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Coefficient, Identity, IdentityCheck, Images, Input,
-    Joint, JointState, Learning, Mode, Output, OutputAngle, Queue, Recorder, Ring, Seen, Sink, Slip, SlipBank,
-    SlipElement, SlipState, Store, Term, Watch, self_test,
+    Adjustment, Aged, Identity, IdentityCheck, Images, Input, Joint, JointState, Mode, Output, OutputAngle, Store,
+    self_test,
+};
+use flexspline_estimation::{
+    AdaptSettings, AdaptState, Adapted, Coefficient, Learning, MaxwellSlip, OnlineCalibration, Seen, Slip, SlipElement,
+    SlipState, Term,
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
 use flexspline_firmware::{TABLES, finish};
+use flexspline_telemetry::{Queue, Recorder, Ring, Sink, Watch};
 
 const INPUTS: u32 = 10_000;
 
@@ -59,13 +63,13 @@ fn starts_well(image: &[u8]) -> bool {
 }
 
 #[inline(never)]
-fn update(adapter: &Adapter<5>, state: &mut AdaptState<5>, seen: &Seen<'_>) -> Adapted {
+fn update(adapter: &OnlineCalibration<5>, state: &mut AdaptState<5>, seen: &Seen<'_>) -> Adapted {
     adapter.update(state, seen)
 }
 
 #[inline(never)]
 fn slip(
-    bank: &SlipBank<4>,
+    bank: &MaxwellSlip<4>,
     state: &mut SlipState<4>,
     nominal: OutputAngle,
     adjustment: Adjustment,
@@ -89,10 +93,10 @@ fn run(counter: &Counter) -> Option<[Range; 6]> {
     let images = Images::new(first, second);
     let mut store = Store::new();
     store.activate(&images, JOINT.drive(), 21.0).ok()?;
-    let adapter = Adapter::new(&SETTINGS, &joint, &store, 0).ok()?;
+    let adapter = OnlineCalibration::new(&SETTINGS, &joint, &store, 0).ok()?;
     let mut learnt = adapter.start();
     learnt.set_learning(Learning::On);
-    let bank = SlipBank::new(SPRINGS)?;
+    let bank = MaxwellSlip::new(SPRINGS)?;
     let mut springs = SlipState::unknown();
     let mut ring = Recorder::new(Ring::<16>::new(), NonZeroU32::MIN);
     let mut queue = Queue::<16>::new();

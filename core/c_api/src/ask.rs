@@ -1,0 +1,272 @@
+//! Questions to a table outside a tick.
+
+use super::names::{FLEXSPLINE_FIXED_CIRCULAR_SPLINE, FLEXSPLINE_FIXED_FLEXSPLINE};
+use super::{
+    FlexsplineJoint, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STATE_MARK, STORE_MARK, apart,
+    bytes, clear, get, give, image_status, quality_code, span, status, usable,
+};
+use flexspline::{
+    Approach, Direction, FixedMember, GeneratorAngle, Joint, JointState, OutputAngle, PlayState, Store, Table,
+};
+
+/// Expected motion of the output.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplinePrediction {
+    /// Output angle, counts of 2^-32 turn: nominal plus transmission error.
+    pub output_counts: i64,
+    /// Nominal output angle: generator over ratio.
+    pub nominal_counts: i64,
+    /// Actual less nominal, rad; 0 if disabled.
+    pub transmission_error_rad: f32,
+    /// The error lies within +- this as far as play and jumps go, rad.
+    pub uncertainty_rad: f32,
+    /// `FLEXSPLINE_QUALITY_...`.
+    pub quality: u8,
+}
+
+/// Command for a wanted output angle.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineCommand {
+    /// Generator angle to go to, counts of 2^-32 turn.
+    pub generator_counts: i64,
+    /// The transmission error expected there, rad; 0 if disabled.
+    pub predicted_error_rad: f32,
+    /// It lies within +- this, rad.
+    pub uncertainty_rad: f32,
+    /// `FLEXSPLINE_QUALITY_...`.
+    pub quality: u8,
+}
+
+/// Where a drive rests inside its play.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplinePlay {
+    /// Nominal output of the last tick with a sample, counts of 2^-32 turn; 0 before the first.
+    pub nominal_counts: i64,
+    /// Estimated output then; 0 before the first.
+    pub output_counts: i64,
+    /// Offset from the middle of the play, rad: the middle of what is possible.
+    pub offset_rad: f32,
+    /// It is off by no more than this, rad.
+    pub uncertainty_rad: f32,
+    /// 1 if the side is known, else 0.
+    pub is_known: u8,
+    /// 0 before the first tick with a sample and a table, else 1.
+    pub is_started: u8,
+}
+
+/// Contents of an image's header.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineImageReport {
+    /// Id of the table: the first 8 bytes of the BLAKE3 of its contents, as reports show them in hexadecimal digits.
+    pub table_id: [u8; 8],
+    /// Torques that it holds for, N m, both ends included.
+    pub torque_range_n_m: [f32; 2],
+    /// Temperatures that it holds for, degrees C, both ends included.
+    pub temperature_range_c: [f32; 2],
+    /// No error that it gives is larger, rad.
+    pub error_limit_rad: f32,
+    /// Largest deviation from the samples that it was made of, rad.
+    pub projection_worst_rad: f32,
+    /// Root of the mean square of that, rad.
+    pub projection_rms_rad: f32,
+    /// Teeth of the flexspline.
+    pub flexspline_teeth: u16,
+    /// Teeth of the circular spline.
+    pub circular_spline_teeth: u16,
+    /// `FLEXSPLINE_FIXED_...`.
+    pub fixed_member: u8,
+    /// Kind of wave generator: 0 other, 1 two-roller, 2 four-roller, 3 double-disc, 4 cam
+    /// (`flexspline_generator_name`).
+    pub generator: u8,
+}
+
+/// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state
+/// rests, which stays as it is. A path with a reversal is that of ticks.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_forward(
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    state: *const FlexsplineState,
+    generator_counts: i64,
+    torque_n_m: f32,
+    prediction: *mut FlexsplinePrediction,
+) -> FlexsplineStatus {
+    let ask = || {
+        clear(span(prediction), [span(joint), span(store), span(state)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let state: &JointState = get(state, STATE_MARK)?;
+        let mut play: PlayState = *state.play();
+        let found = joint.forward(store, &mut play, GeneratorAngle::from_counts(generator_counts), torque_n_m);
+        give(
+            prediction,
+            FlexsplinePrediction {
+                output_counts: found.output.counts(),
+                nominal_counts: found.nominal.counts(),
+                transmission_error_rad: found.transmission_error_rad,
+                uncertainty_rad: found.uncertainty_rad,
+                quality: quality_code(found.quality),
+            },
+        )
+    };
+    status(ask())
+}
+
+/// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion
+/// forward (+1) or backward (-1), or from where the state rests (0). No limiter and no mode: that is the tick's part.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_inverse(
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    state: *const FlexsplineState,
+    target_counts: i64,
+    torque_n_m: f32,
+    direction: i8,
+    command: *mut FlexsplineCommand,
+) -> FlexsplineStatus {
+    let ask = || {
+        clear(span(command), [span(joint), span(store), span(state)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let state: &JointState = get(state, STATE_MARK)?;
+        let approach = match direction {
+            1 => Approach::Moving(Direction::Forward),
+            -1 => Approach::Moving(Direction::Backward),
+            0 => Approach::From(state.play()),
+            _ => return Err(FlexsplineStatus::Argument),
+        };
+        let found = joint.inverse(store, OutputAngle::from_counts(target_counts), torque_n_m, approach);
+        give(
+            command,
+            FlexsplineCommand {
+                generator_counts: found.generator.counts(),
+                predicted_error_rad: found.predicted_error_rad,
+                uncertainty_rad: found.uncertainty_rad,
+                quality: quality_code(found.quality),
+            },
+        )
+    };
+    status(ask())
+}
+
+/// Nominal output angle of a generator angle, counts of 2^-32 turn: generator over ratio.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_nominal_output(
+    joint: *const FlexsplineJoint,
+    generator_counts: i64,
+    output_counts: *mut i64,
+) -> FlexsplineStatus {
+    let ask = || {
+        apart([span(joint), span(output_counts)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        give(output_counts, joint.drive().nominal_output(GeneratorAngle::from_counts(generator_counts)).counts())
+    };
+    status(ask())
+}
+
+/// Generator angle whose nominal output is an output angle, counts of 2^-32 turn: output times ratio.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_nominal_generator(
+    joint: *const FlexsplineJoint,
+    output_counts: i64,
+    generator_counts: *mut i64,
+) -> FlexsplineStatus {
+    let ask = || {
+        apart([span(joint), span(generator_counts)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        give(generator_counts, joint.drive().nominal_generator(OutputAngle::from_counts(output_counts)).counts())
+    };
+    status(ask())
+}
+
+/// Ratio of a joint's drive, signed: generator turns in a turn of the output.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_ratio(joint: *const FlexsplineJoint, ratio: *mut f32) -> FlexsplineStatus {
+    let ask = || {
+        apart([span(joint), span(ratio)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        give(ratio, joint.drive().ratio())
+    };
+    status(ask())
+}
+
+/// Reports the position of a drive inside its play, as the last tick left it.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_state_play(state: *const FlexsplineState, play: *mut FlexsplinePlay) -> FlexsplineStatus {
+    let fill = || {
+        apart([span(state), span(play)])?;
+        let state: &JointState = get(state, STATE_MARK)?;
+        let found = state.play();
+        give(
+            play,
+            FlexsplinePlay {
+                nominal_counts: found.nominal().map_or(0, OutputAngle::counts),
+                output_counts: found.output().map_or(0, OutputAngle::counts),
+                offset_rad: found.offset_rad(),
+                uncertainty_rad: found.uncertainty_rad(),
+                is_known: found.is_known() as u8,
+                is_started: found.nominal().is_some() as u8,
+            },
+        )
+    };
+    status(fill())
+}
+
+/// Checks one image in full, without a store, and reports its header. The work grows with the image: for
+/// start-up, or the host.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_image_report(
+    image: *const u8,
+    image_bytes: usize,
+    report: *mut FlexsplineImageReport,
+) -> FlexsplineStatus {
+    let fill = || {
+        usable(report)?;
+        let read = bytes(image, image_bytes)?;
+        apart([(image as usize, image_bytes), span(report)])?;
+        let table = Table::check(read).map_err(image_status)?;
+        let drive = table.drive();
+        give(
+            report,
+            FlexsplineImageReport {
+                table_id: table.id().0,
+                torque_range_n_m: table.torque_range_n_m(),
+                temperature_range_c: table.temperature_range_c(),
+                error_limit_rad: table.error_limit_rad(),
+                projection_worst_rad: table.projection_worst_rad(),
+                projection_rms_rad: table.projection_rms_rad(),
+                flexspline_teeth: drive.flexspline_teeth(),
+                circular_spline_teeth: drive.circular_spline_teeth(),
+                fixed_member: match drive.fixed() {
+                    FixedMember::Flexspline => FLEXSPLINE_FIXED_FLEXSPLINE,
+                    FixedMember::CircularSpline => FLEXSPLINE_FIXED_CIRCULAR_SPLINE,
+                },
+                generator: table.generator_kind().code(),
+            },
+        )
+    };
+    status(fill())
+}
+
+/// How far units scatter about a table that a data sheet completed, as a share s of their stiffness: 0.3 of `+-30 %`; 0
+/// of any other table. What the table says of wind-up may be off by s / (1 - s) of it, which no tick states. Checks the
+/// image in full, as [`flexspline_image_report`] does.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_image_sheet_scatter(
+    image: *const u8,
+    image_bytes: usize,
+    scatter: *mut f32,
+) -> FlexsplineStatus {
+    let fill = || {
+        usable(scatter)?;
+        let read = bytes(image, image_bytes)?;
+        apart([(image as usize, image_bytes), span(scatter)])?;
+        let table = Table::check(read).map_err(image_status)?;
+        give(scatter, table.sheet_scatter().unwrap_or(0.0))
+    };
+    status(fill())
+}

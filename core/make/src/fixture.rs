@@ -1,0 +1,99 @@
+//! Samples of the drive of [`flexspline::testing::fixture`], and a plan of its table.
+
+use crate::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+use core::f64::consts::TAU;
+use flexspline::Direction;
+pub use flexspline::testing::fixture::{ARCSEC, PITCH, TEMPERATURES, TORQUES, drive, error, id, image, provenance};
+use std::vec::Vec;
+
+pub fn sample(generator_rad: f64, torque: f64, temperature: f64, direction: Direction, long: bool) -> Sample {
+    Sample {
+        generator_rad,
+        torque_n_m: torque,
+        temperature_c: temperature,
+        direction,
+        output_rad: generator_rad / 95.0 + error(generator_rad, torque, temperature, direction, long),
+    }
+}
+
+/// Every node in both directions over one pitch; `long` adds 96 generator turns at one node, for the harmonics.
+pub fn samples(long: bool) -> Vec<Sample> {
+    let mut samples = Vec::new();
+    for temperature in TEMPERATURES {
+        for torque in TORQUES {
+            for direction in [Direction::Forward, Direction::Backward] {
+                for position in 0..16 {
+                    let generator = 1.0 + PITCH * (position as f64 + 0.3) / 16.0;
+                    samples.push(sample(generator, torque as f64, temperature as f64, direction, long));
+                }
+            }
+        }
+    }
+    if long {
+        for direction in [Direction::Forward, Direction::Backward] {
+            for i in 0..3000 {
+                samples.push(sample(TAU * 96.0 * i as f64 / 2999.0, 5.0, 20.0, direction, long));
+            }
+        }
+    }
+    samples
+}
+
+pub fn plan(long: bool) -> Plan<'static> {
+    let curve = |orders, nodes| {
+        if long { Harmonics { orders, nodes } } else { Harmonics::default() }
+    };
+    Plan {
+        drive: drive(),
+        torque_nodes_n_m: &TORQUES,
+        temperature_nodes_c: &TEMPERATURES,
+        ripple_nodes: 16,
+        generator: curve(&[2, 4], 64),
+        material: curve(&[2, 4], 64),
+        output: curve(&[1], 32),
+        missing_direction: MissingDirection::Refuse,
+        negative_half_width_tolerance_rad: 0.01 * ARCSEC,
+        deviation_limit_rad: 1.0 * ARCSEC,
+    }
+}
+
+/// Buffers large enough for a plan.
+pub struct Buffers {
+    numbers: Vec<f64>,
+    marks: Vec<u64>,
+    values: Vec<f32>,
+}
+
+impl Buffers {
+    pub fn new(plan: &Plan<'_>) -> Self {
+        Self {
+            numbers: std::vec![f64::NAN; plan.numbers_len()],
+            marks: std::vec![u64::MAX; plan.marks_len()],
+            values: std::vec![f32::NAN; plan.values_len()],
+        }
+    }
+
+    pub fn workspace(&mut self) -> Workspace<'_> {
+        Workspace { numbers: &mut self.numbers, marks: &mut self.marks, values: &mut self.values }
+    }
+}
+
+/// The images that the tests of the other crates use are the ones made here, and are written with
+/// FLEXSPLINE_KEEP_FIXTURES set.
+#[test]
+fn the_images_kept_are_the_ones_made() {
+    for (long, name) in [(false, "short"), (true, "long")] {
+        let plan = plan(long);
+        let mut made = std::vec![0; plan.image_bytes()];
+        let mut buffers = Buffers::new(&plan);
+        make_image(&plan, &provenance(), &samples(long), buffers.workspace(), &mut made, id).unwrap();
+        if std::env::var_os("FLEXSPLINE_KEEP_FIXTURES").is_some() {
+            std::fs::write(std::format!("{}/../src/fixtures/{name}.fxt", env!("CARGO_MANIFEST_DIR")), &made).unwrap();
+        } else {
+            assert!(
+                image(long) == made,
+                "{name}.fxt is not what is made: run this test with FLEXSPLINE_KEEP_FIXTURES=1"
+            );
+        }
+    }
+}
