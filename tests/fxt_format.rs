@@ -9,12 +9,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use flexspline::{
-    Drive, FixedMember, GeneratorAngle, GeneratorKind, PlayState, Provenance, Quality, Table, TableData, image_bytes,
-    write_image,
-};
+use flexspline::{Drive, FixedMember, GeneratorAngle, GeneratorKind, PlayState, Quality, Table};
 use flexspline_design::tables::samples;
 use flexspline_design::tables::{SampleOptions, from_samples};
+use flexspline_make::{Provenance, TableData, image_bytes, write_image};
 use flexspline_mechanics::drive::{Drive as HostDrive, GeneratorKind as HostKind};
 
 const PAGE: &str = include_str!("../docs/reference/fxt.md");
@@ -196,8 +194,8 @@ fn compare(bytes: &[u8]) {
 
     // Envelope.
     assert_eq!(image.raw("magic"), b"\x89FXT\r\n\x1a\n");
-    assert_eq!(image.integer("version"), usize::from(flexspline::FORMAT_VERSION));
-    assert!(PAGE.contains(&format!("format version: {}", flexspline::FORMAT_VERSION)));
+    assert_eq!(image.integer("version"), usize::from(flexspline::Table::FORMAT_VERSION));
+    assert!(PAGE.contains(&format!("format version: {}", flexspline::Table::FORMAT_VERSION)));
     assert_eq!(image.integer("byte_order"), 0xfeff);
     assert_eq!(image.integer("length"), bytes.len());
     let body = 4 * image.integer("body_words");

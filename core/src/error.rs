@@ -265,7 +265,8 @@ pub enum ImageError {
     },
     /// The inverse does not come close enough in the iterations that a step may take.
     Inverse {
-        /// Error left, rad at the output; at most [`MAX_INVERSE_ERROR_RAD`](crate::MAX_INVERSE_ERROR_RAD) is allowed.
+        /// Error left, rad at the output; at most [`Table::MAX_INVERSE_ERROR_RAD`](crate::Table::MAX_INVERSE_ERROR_RAD)
+        /// is allowed.
         left_rad: f32,
     },
 }

@@ -7,7 +7,6 @@
 use crate::drive::{Drive, FixedMember};
 use crate::joint::Limits;
 use crate::play::Direction;
-use crate::table::{GeneratorKind, Provenance};
 use core::f64::consts::TAU;
 use std::vec::Vec;
 
@@ -74,19 +73,6 @@ pub fn error(generator_rad: f64, torque: f64, temperature: f64, direction: Direc
     base + if long { harmonics(generator_rad) } else { 0.0 }
 }
 
-pub fn provenance() -> Provenance<'static> {
-    Provenance {
-        generator_kind: GeneratorKind::Cam,
-        drive_hash: [0x5a; 32],
-        tool_version: "flexspline 0.1.0",
-        mesh_level: "closed form",
-        solver_residual: 1e-9,
-        torque_range_n_m: [-50.0, 50.0],
-        temperature_range_c: [-40.0, 80.0],
-        error_limit_rad: 0.02,
-    }
-}
-
 /// A stand-in for BLAKE3 that reads every byte.
 pub fn id(contents: &[u8]) -> [u8; 8] {
     let hash = contents
@@ -99,4 +85,18 @@ pub fn id(contents: &[u8]) -> [u8; 8] {
 pub fn image(long: bool) -> Vec<u8> {
     let kept: &[u8] = if long { include_bytes!("fixtures/long.fxt") } else { include_bytes!("fixtures/short.fxt") };
     kept.to_vec()
+}
+
+#[cfg(test)]
+pub fn provenance() -> crate::write::Provenance<'static> {
+    crate::write::Provenance {
+        generator_kind: crate::GeneratorKind::Cam,
+        drive_hash: [0x5a; 32],
+        tool_version: "flexspline 0.1.0",
+        mesh_level: "closed form",
+        solver_residual: 1e-9,
+        torque_range_n_m: [-50.0, 50.0],
+        temperature_range_c: [-40.0, 80.0],
+        error_limit_rad: 0.02,
+    }
 }

@@ -35,21 +35,7 @@
 //!     };
 //!     JOINT.tick(images, store, state, &input).command
 //! }
-//! # let data = TableData {
-//! #     drive: *JOINT.drive(),
-//! #     torque_nodes_n_m: &[-20.0, 20.0], temperature_nodes_c: &[20.0], ripple_nodes: 0,
-//! #     mean_rad: &[-1e-3, 1e-3], half_width_rad: &[1e-4, 1e-4],
-//! #     mean_ripple_rad: &[], half_width_ripple_rad: &[],
-//! #     generator_curve_rad: &[], material_curve_rad: &[], output_curve_rad: &[],
-//! #     projection_worst_rad: 0.0, projection_rms_rad: 0.0,
-//! # };
-//! # let provenance = Provenance {
-//! #     generator_kind: GeneratorKind::Cam, drive_hash: [0; 32], tool_version: "doc", mesh_level: "none",
-//! #     solver_residual: 0.0, torque_range_n_m: [-20.0, 20.0], temperature_range_c: [0.0, 40.0],
-//! #     error_limit_rad: 0.02,
-//! # };
-//! # let mut image = vec![0; image_bytes(2, 1, 0, [0; 3])];
-//! # write_image(&data, &provenance, &mut image, |_| [0; 8]).unwrap();
+//! # let image = *include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/fixtures/short.fxt"));
 //! # let twin = image.clone();
 //! # let images = Images::new(&image, &twin);
 //! # let (mut store, mut state) = (Store::new(), JointState::new());
@@ -59,7 +45,7 @@
 //! # for _ in 0..500 {
 //! #     command = tick(&images, &mut store, &mut state, command, target);
 //! # }
-//! # let reached = Table::check(&image).unwrap().forward(&mut state.play().clone(), command, 12.0, 20.0);
+//! # let reached = Table::check(&image).unwrap().forward(&mut state.play().clone(), command, 12.0, 21.0);
 //! # assert!(reached.output.minus_rad(target).abs() < 2e-8, "{}", reached.output.minus_rad(target));
 //! ```
 //! [`Encoder`] converts the counts of an encoder into an angle, and back: any counts in a turn, registers that begin
@@ -97,8 +83,8 @@
 //!   activates nothing.
 //! * Which side of the play the drive rests on is unknown after a reset, until motion has shown it.
 //! * Angles are integers: turning for years, or a million small steps, adds no error.
-//! * The host makes tables with the code that reads them: one definition of where a node sits ([`grid`]), and the
-//!   deviation from the samples is measured on the finished image (`flexspline-make`).
+//! * The host makes tables with the code that reads them: one definition of where a node sits ([`grid`](shared::grid)),
+//!   and the deviation from the samples is measured on the finished image (`flexspline-make`).
 //!
 //! # Signs and units
 //! * Angles in radians at the interface, positive counter-clockwise; torque N·m, temperature °C.
@@ -161,20 +147,23 @@ pub use drive::{Drive, FixedMember, Phases};
 pub use encoder::{Encoder, EncoderError, EncoderSettings, EncoderState, EncoderWrap};
 pub use error::{DriveError, Field, ImageError};
 pub use joint::{
-    Adjustment, Aged, Flags, Implausible, Input, Joint, JointState, Limits, Mode, ModeError, MotionAhead, Output,
-    Overrun, Readings, RestoreError, SAVED_JOINT_BYTES, SettingError, StartUp, StartUpSettings, StartUpStep,
-    TorquePath, TorqueReading, TorqueSettings,
+    Adjustment, Aged, Flags, Implausible, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, Readings,
+    RestoreError, SettingError, StartUp, StartUpSettings, StartUpStep, TorquePath, TorqueReading, TorqueSettings,
 };
-pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
+pub use play::{Direction, PlayState};
 pub use self_test::{SelfTestError, self_test};
-pub use store::{
-    ActivateError, Activation, Counters, Health, Images, Progress, STORE_PAGES, STORE_WORDS, Store, Upload,
-    UploadError, mend_page,
-};
+pub use store::{ActivateError, Activation, Counters, Health, Images, Progress, Store, Upload, UploadError};
 pub use table::{
-    Approach, Bounds, Command, FORMAT_VERSION, GeneratorKind, INVERSE_TOLERANCE_RAD, Identity, IdentityCheck,
-    MAX_ERROR_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
-    OperatingPoint, PAGE_BYTES, Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError,
-    grid, image_bytes, write_image,
+    Approach, Bounds, Command, GeneratorKind, Identity, IdentityCheck, Prediction, Quality, Table, TableId,
 };
-pub use unit::{Arcsec, Degrees, Rad};
+pub use unit::{Arcsec, Degrees};
+
+// The writer of images is that of `flexspline-make`: the tests of the reader need it, with the types of this crate.
+#[cfg(test)]
+extern crate self as flexspline;
+#[cfg(test)]
+#[path = "../make/src/slopes.rs"]
+mod slopes;
+#[cfg(test)]
+#[path = "../make/src/write.rs"]
+mod write;

@@ -5,11 +5,6 @@ pub fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// As [`larger`], in double precision.
-pub fn larger64(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
 /// Square root of a number, 0 of one below 0: an estimate of 1/√x from the exponent and steps of Newton, of which two
 /// leave 5e-6 of the root, three 3e-7.
 ///

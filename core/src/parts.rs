@@ -3,8 +3,9 @@
 use crate::drive::Drive;
 use crate::play::PlayState;
 use crate::store::Store;
+pub use crate::table::OperatingPoint;
 use crate::table::{Doubt, TableModel};
-use crate::{GeneratorAngle, Joint, OperatingPoint, OutputAngle};
+use crate::{GeneratorAngle, Joint, OutputAngle};
 
 fn model<'s>(drive: &'s Drive, store: &'s Store) -> TableModel<'s, Store> {
     TableModel { memory: store, drive }

@@ -65,9 +65,6 @@ pub struct PlayState {
     half: i32,
 }
 
-/// Size of a saved state.
-pub const SAVED_STATE_BYTES: usize = 28;
-
 impl Default for PlayState {
     fn default() -> Self {
         Self::unknown()
@@ -75,6 +72,9 @@ impl Default for PlayState {
 }
 
 impl PlayState {
+    /// Bytes of a saved state.
+    pub const SAVED_BYTES: usize = 28;
+
     /// After a reset: anywhere inside the play.
     #[must_use]
     pub const fn unknown() -> Self {
@@ -225,8 +225,8 @@ impl PlayState {
 
     /// The state as bytes, with a CRC-32, for storage across a reset.
     #[must_use]
-    pub fn save(&self) -> [u8; SAVED_STATE_BYTES] {
-        let mut bytes = [0; SAVED_STATE_BYTES];
+    pub fn save(&self) -> [u8; Self::SAVED_BYTES] {
+        let mut bytes = [0; Self::SAVED_BYTES];
         let (nominal, parts) = self.parts();
         seal(&mut bytes, [low(nominal), high(nominal)].into_iter().chain(parts.map(|part| part as u32)));
         bytes
@@ -236,7 +236,7 @@ impl PlayState {
     ///
     /// Restore only if the joint cannot have moved meanwhile, else start from [`Self::unknown`].
     #[must_use]
-    pub fn restore(bytes: &[u8; SAVED_STATE_BYTES]) -> Option<Self> {
+    pub fn restore(bytes: &[u8; Self::SAVED_BYTES]) -> Option<Self> {
         let mut next = unseal(bytes)?;
         let nominal = next() as i64 | (next() as i64) << 32;
         Self::of(nominal, [next(), next(), next(), next()].map(|part| part as i32))
@@ -373,7 +373,7 @@ mod tests {
         for state in [PlayState::unknown(), known(), PlayState::after_motion(Direction::Backward)] {
             let saved = state.save();
             assert_eq!(PlayState::restore(&saved), Some(state));
-            for bit in 0..SAVED_STATE_BYTES * 8 {
+            for bit in 0..PlayState::SAVED_BYTES * 8 {
                 let mut damaged = saved;
                 damaged[bit / 8] ^= 1 << (bit % 8);
                 assert_eq!(PlayState::restore(&damaged), None, "bit {bit}");

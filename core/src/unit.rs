@@ -1,20 +1,16 @@
 //! Angles with their unit: for settings, which are numbers in radians.
 //!
 //! ```
-//! use flexspline::{Arcsec, Degrees, OutputAngle, Rad};
+//! use flexspline::{Arcsec, Degrees, OutputAngle};
 //!
 //! let deadband_rad: f32 = Arcsec(0.2).rad(); // a field of `Limits`
 //! let target = OutputAngle::of(Degrees(12.5)).ok_or("beyond 2^31 turns")?;
-//! assert!((target.to_rad() - Rad::from(Degrees(12.5)).0).abs() < 1e-9 && deadband_rad > 9.6e-7);
+//! assert!((target.to_rad() - f64::from(Degrees(12.5))).abs() < 1e-9 && deadband_rad > 9.6e-7);
 //! # Ok::<(), &str>(())
 //! ```
 
 use crate::angle::{GeneratorAngle, OutputAngle};
 use core::f64::consts::PI;
-
-/// An angle in radians.
-#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-pub struct Rad(pub f64);
 
 /// An angle in degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
@@ -23,14 +19,6 @@ pub struct Degrees(pub f64);
 /// An angle in arcseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub struct Arcsec(pub f64);
-
-impl Rad {
-    /// As the number that settings take.
-    #[must_use]
-    pub const fn rad(self) -> f32 {
-        self.0 as f32
-    }
-}
 
 impl Degrees {
     /// In radians, as the number that settings take.
@@ -48,31 +36,33 @@ impl Arcsec {
     }
 }
 
-impl From<Degrees> for Rad {
+/// In radians.
+impl From<Degrees> for f64 {
     fn from(Degrees(degrees): Degrees) -> Self {
-        Self(degrees * (PI / 180.0))
+        degrees * (PI / 180.0)
     }
 }
 
-impl From<Arcsec> for Rad {
+/// In radians.
+impl From<Arcsec> for f64 {
     fn from(Arcsec(arcsec): Arcsec) -> Self {
-        Self(arcsec * (PI / 648_000.0))
+        arcsec * (PI / 648_000.0)
     }
 }
 
 impl GeneratorAngle {
-    /// As [`Self::from_rad`], of an angle with its unit.
+    /// As [`Self::from_rad`], of an angle with its unit; a number is in radians.
     #[must_use]
-    pub fn of(angle: impl Into<Rad>) -> Option<Self> {
-        Self::from_rad(angle.into().0)
+    pub fn of(angle: impl Into<f64>) -> Option<Self> {
+        Self::from_rad(angle.into())
     }
 }
 
 impl OutputAngle {
-    /// As [`Self::from_rad`], of an angle with its unit.
+    /// As [`Self::from_rad`], of an angle with its unit; a number is in radians.
     #[must_use]
-    pub fn of(angle: impl Into<Rad>) -> Option<Self> {
-        Self::from_rad(angle.into().0)
+    pub fn of(angle: impl Into<f64>) -> Option<Self> {
+        Self::from_rad(angle.into())
     }
 }
 
@@ -85,10 +75,10 @@ mod tests {
         let quarter = Some(OutputAngle::new(0, 1 << 30));
         assert_eq!(OutputAngle::of(Degrees(90.0)), quarter);
         assert_eq!(OutputAngle::of(Arcsec(324_000.0)), quarter);
-        assert_eq!(OutputAngle::of(Rad(core::f64::consts::FRAC_PI_2)), quarter);
+        assert_eq!(OutputAngle::of(core::f64::consts::FRAC_PI_2), quarter);
         assert_eq!(GeneratorAngle::of(Degrees(-90.0)), Some(GeneratorAngle::new(-1, 3 << 30)));
         assert_eq!(GeneratorAngle::of(Degrees(f64::NAN)), None);
         assert!((Arcsec(1.0).rad() - 4.848_137e-6).abs() < 1e-12);
-        assert_eq!((Degrees(1.0).rad(), Rad(0.5).rad()), (Arcsec(3600.0).rad(), 0.5));
+        assert_eq!(Degrees(1.0).rad(), Arcsec(3600.0).rad());
     }
 }

@@ -83,6 +83,37 @@ fn every_requirement_has_tests_that_exist() {
     assert!(page.lines().filter(|line| line.starts_with("| C-")).count() > 40);
 }
 
+/// Rows of the auditor's page whose function is not in the file that they name, or whose requirement is none.
+fn lost_steps(page: &str, requirements: &str) -> Vec<String> {
+    let mut lost = Vec::new();
+    for row in page.lines().filter(|line| line.contains(".rs` `")) {
+        let mut names = row.split('`').skip(1).step_by(2);
+        let (file, function) = (names.next().unwrap_or_default(), names.next().unwrap_or_default());
+        let source = fs::read_to_string(top().join("core/src").join(file)).unwrap_or_default();
+        let ids = row.split('|').rev().nth(1).unwrap_or_default().trim().split(", ");
+        let known = ids.flat_map(|ids| ids.split(" to ")).all(|id| requirements.contains(&format!("| {id} |")));
+        if !known || !source.contains(&format!("fn {function}(")) && !source.contains(&format!("fn {function}<")) {
+            lost.push(row.to_owned());
+        }
+    }
+    lost
+}
+
+#[test]
+fn every_step_of_the_tick_is_a_function_of_its_file() {
+    let read = |path: &str| fs::read_to_string(top().join(path)).expect("a file of the project");
+    let (page, requirements) = (read("docs/reference/tick.md"), read("docs/requirements.md"));
+    assert_eq!(lost_steps(&page, &requirements), Vec::<String>::new());
+    assert!(page.lines().filter(|line| line.contains(".rs` `")).count() > 20);
+    for row in [
+        "| 1 | `play.rs` `fly` | x | C-16 |",
+        "| 1 | `player.rs` `follow` | x | C-16 |",
+        "| 1 | `play.rs` `follow` | x | C-00 |",
+    ] {
+        assert_eq!(lost_steps(row, &requirements), [row]);
+    }
+}
+
 #[test]
 fn a_page_with_faults_is_refused() {
     let tests = BTreeSet::from(["one".to_owned()]);

@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Provenance};
+use flexspline::{Direction, Drive, FixedMember, GeneratorKind};
 use flexspline_estimation::{Inertias, Noise, TwoMassObserver};
+use flexspline_make::Provenance;
 use flexspline_make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
 
 fn main() {

@@ -2,8 +2,8 @@
 
 use super::names::{FLEXSPLINE_FIXED_CIRCULAR_SPLINE, FLEXSPLINE_FIXED_FLEXSPLINE};
 use super::{
-    FlexsplineJoint, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STATE_MARK, STORE_MARK, apart,
-    bytes, clear, get, give, image_status, quality_code, span, status, usable,
+    FlexsplineJoint, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object, apart, bytes, clear, get, give,
+    image_status, quality_code, span, status, usable,
 };
 use flexspline::{
     Approach, Direction, FixedMember, GeneratorAngle, Joint, JointState, OutputAngle, PlayState, Store, Table,
@@ -97,9 +97,9 @@ pub extern "C" fn flexspline_forward(
 ) -> FlexsplineStatus {
     let ask = || {
         clear(span(prediction), [span(joint), span(store), span(state)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
-        let state: &JointState = get(state, STATE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
+        let state: &JointState = get(state, Object::State)?;
         let mut play: PlayState = *state.play();
         let found = joint.forward(store, &mut play, GeneratorAngle::from_counts(generator_counts), torque_n_m);
         give(
@@ -130,9 +130,9 @@ pub extern "C" fn flexspline_inverse(
 ) -> FlexsplineStatus {
     let ask = || {
         clear(span(command), [span(joint), span(store), span(state)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
-        let state: &JointState = get(state, STATE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
+        let state: &JointState = get(state, Object::State)?;
         let approach = match direction {
             1 => Approach::Moving(Direction::Forward),
             -1 => Approach::Moving(Direction::Backward),
@@ -162,7 +162,7 @@ pub extern "C" fn flexspline_nominal_output(
 ) -> FlexsplineStatus {
     let ask = || {
         apart([span(joint), span(output_counts)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
         give(output_counts, joint.drive().nominal_output(GeneratorAngle::from_counts(generator_counts)).counts())
     };
     status(ask())
@@ -177,7 +177,7 @@ pub extern "C" fn flexspline_nominal_generator(
 ) -> FlexsplineStatus {
     let ask = || {
         apart([span(joint), span(generator_counts)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
         give(generator_counts, joint.drive().nominal_generator(OutputAngle::from_counts(output_counts)).counts())
     };
     status(ask())
@@ -188,7 +188,7 @@ pub extern "C" fn flexspline_nominal_generator(
 pub extern "C" fn flexspline_ratio(joint: *const FlexsplineJoint, ratio: *mut f32) -> FlexsplineStatus {
     let ask = || {
         apart([span(joint), span(ratio)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
         give(ratio, joint.drive().ratio())
     };
     status(ask())
@@ -199,7 +199,7 @@ pub extern "C" fn flexspline_ratio(joint: *const FlexsplineJoint, ratio: *mut f3
 pub extern "C" fn flexspline_state_play(state: *const FlexsplineState, play: *mut FlexsplinePlay) -> FlexsplineStatus {
     let fill = || {
         apart([span(state), span(play)])?;
-        let state: &JointState = get(state, STATE_MARK)?;
+        let state: &JointState = get(state, Object::State)?;
         let found = state.play();
         give(
             play,

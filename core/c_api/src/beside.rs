@@ -3,8 +3,8 @@
 
 use super::names::*;
 use super::{
-    FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STATE_MARK,
-    STORE_MARK, apart, bytes, clear, copied, get, get_mut, give, image_status, put, span, status, usable,
+    FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object, apart, bytes, clear,
+    copied, get, get_mut, give, image_status, put, span, status, usable,
 };
 use core::mem::MaybeUninit;
 use flexspline::{
@@ -212,11 +212,6 @@ struct ReceptionProgress {
     received: usize,
 }
 
-const UPLOAD_MARK: u32 = 0x7855_5446;
-const WATCH_MARK: u32 = 0x7857_5446;
-const PREDICTOR_MARK: u32 = 0x7850_5446;
-const OBSERVER_MARK: u32 = 0x784f_5446;
-
 const _: () = assert!(FLEXSPLINE_RECORD_BYTES == RECORD_BYTES && FLEXSPLINE_PREDICTOR_PARTS == PREDICTOR_PARTS);
 
 pub(super) const fn quality_code(quality: Quality) -> u8 {
@@ -289,7 +284,7 @@ fn upload_status(error: UploadError) -> FlexsplineStatus {
 /// image in use.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_upload_begin(upload: *mut FlexsplineUpload, announced: usize) -> FlexsplineStatus {
-    status(put(upload, UPLOAD_MARK, ReceptionProgress { announced, received: 0 }))
+    status(put(upload, Object::Upload, ReceptionProgress { announced, received: 0 }))
 }
 
 /// Takes the bytes from `offset` on: `FLEXSPLINE_STATUS_ORDER` if they are not the next ones, which can still come.
@@ -307,7 +302,7 @@ pub extern "C" fn flexspline_upload_chunk(
         let chunk_read = bytes(chunk, chunk_bytes)?;
         let (upload_span, buffer_span) = (span(upload), (buffer as usize, buffer_bytes));
         apart([upload_span, buffer_span, (chunk as usize, chunk_bytes)])?;
-        let progress: &mut ReceptionProgress = get_mut(upload, UPLOAD_MARK)?;
+        let progress: &mut ReceptionProgress = get_mut(upload, Object::Upload)?;
         if buffer_bytes > isize::MAX as usize {
             return Err(FlexsplineStatus::Argument);
         }
@@ -334,7 +329,7 @@ pub extern "C" fn flexspline_upload_finish(
         let image = bytes(buffer, buffer_bytes)?;
         apart([span(upload), (buffer as usize, buffer_bytes), span(table_id)])?;
         usable(table_id)?;
-        let &ReceptionProgress { announced, received } = get(upload, UPLOAD_MARK)?;
+        let &ReceptionProgress { announced, received } = get(upload, Object::Upload)?;
         let id = Upload::check(image, announced, received).map_err(upload_status)?.id();
         // SAFETY: not null, apart from what is borrowed; the caller's.
         unsafe { table_id.write(id.0) };
@@ -346,7 +341,7 @@ pub extern "C" fn flexspline_upload_finish(
 /// Begins to watch for events: off, without a table.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_watch_init(watch: *mut FlexsplineWatch) -> FlexsplineStatus {
-    status(put(watch, WATCH_MARK, Watch::new()))
+    status(put(watch, Object::Watch, Watch::new()))
 }
 
 /// Reports the changes, after `flexspline_tick`; `output` is that tick's output.
@@ -367,9 +362,9 @@ pub extern "C" fn flexspline_watch_see(
         apart([span(watch), span(events)])?;
         usable(events)?;
         let given = given(output)?;
-        let state: &JointState = get(state, STATE_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
-        let watch: &mut Watch = get_mut(watch, WATCH_MARK)?;
+        let state: &JointState = get(state, Object::State)?;
+        let store: &Store = get(store, Object::Store)?;
+        let watch: &mut Watch = get_mut(watch, Object::Watch)?;
         let mut filled = FlexsplineEvents::default();
         for event in watch.see(state, store, &given).iter() {
             filled.events |= match event {
@@ -420,8 +415,8 @@ pub extern "C" fn flexspline_record(
         }
         usable(record)?;
         let given = given(output)?;
-        let state: &JointState = get(state, STATE_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
+        let state: &JointState = get(state, Object::State)?;
+        let store: &Store = get(store, Object::Store)?;
         let made = Record { number, lost, ..Record::of(tick, state, store, &given) };
         // SAFETY: not null, apart from what is borrowed; the caller owns this length.
         unsafe { record.write(made.encode()) };
@@ -440,7 +435,7 @@ pub extern "C" fn flexspline_predictor_init(
     let make = || {
         apart([span(predictor), span(parts)])?;
         let made = TwoMassObserver::from_parts(&copied(parts)?).map_err(|_| FlexsplineStatus::Argument)?;
-        put(predictor, PREDICTOR_MARK, made)
+        put(predictor, Object::Predictor, made)
     };
     status(make())
 }
@@ -471,7 +466,7 @@ pub extern "C" fn flexspline_predictor_of(
             twist_rad: (n.has_twist != 0).then_some(n.twist_rad),
         };
         let made = TwoMassObserver::new(inertias, noise, tick_s).map_err(|_| FlexsplineStatus::Argument)?;
-        put(predictor, PREDICTOR_MARK, made)
+        put(predictor, Object::Predictor, made)
     };
     status(make())
 }
@@ -484,7 +479,7 @@ pub extern "C" fn flexspline_predictor_parts(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(predictor), span(parts)])?;
-        let predictor: &TwoMassObserver = get(predictor, PREDICTOR_MARK)?;
+        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
         give(parts, predictor.parts())
     };
     status(fill())
@@ -503,7 +498,7 @@ pub extern "C" fn flexspline_predictor_state_bound(
         clear(span(bound), [span(predictor), span(disturbance)])?;
         usable(bound)?;
         let FlexsplineDisturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad } = copied(disturbance)?;
-        let predictor: &TwoMassObserver = get(predictor, PREDICTOR_MARK)?;
+        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
         let disturbance = Disturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad };
         give(bound, predictor.state_bound(&disturbance))
     };
@@ -513,7 +508,7 @@ pub extern "C" fn flexspline_predictor_state_bound(
 /// Makes an observer at rest, without load.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_observer_init(observer: *mut FlexsplineObserver) -> FlexsplineStatus {
-    status(put(observer, OBSERVER_MARK, PredictorState::new()))
+    status(put(observer, Object::Observer, PredictorState::new()))
 }
 
 /// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
@@ -528,8 +523,8 @@ pub extern "C" fn flexspline_observer_step(
     let step = || {
         apart([span(observer), span(predictor)])?;
         let FlexsplineMeasured { torque_n_m, speed_rad_s, twist_rad } = copied(measured)?;
-        let predictor: &TwoMassObserver = get(predictor, PREDICTOR_MARK)?;
-        let observer: &mut PredictorState = get_mut(observer, OBSERVER_MARK)?;
+        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
+        let observer: &mut PredictorState = get_mut(observer, Object::Observer)?;
         if observer.is_lost() || predictor.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
@@ -548,7 +543,7 @@ pub extern "C" fn flexspline_observer_report(
     let fill = || {
         apart([span(observer), span(report)])?;
         usable(report)?;
-        let observer: &PredictorState = get(observer, OBSERVER_MARK)?;
+        let observer: &PredictorState = get(observer, Object::Observer)?;
         let filled = FlexsplineObserverReport {
             twist_rad: observer.twist_rad(),
             load_speed_rad_s: observer.load_speed_rad_s(),
@@ -579,8 +574,8 @@ pub extern "C" fn flexspline_predict(
         }
         usable(ahead)?;
         let from = copied(now)?;
-        let predictor: &TwoMassObserver = get(predictor, PREDICTOR_MARK)?;
-        let observer: &PredictorState = get(observer, OBSERVER_MARK)?;
+        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
+        let observer: &PredictorState = get(observer, Object::Observer)?;
         if observer.is_lost() || predictor.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
@@ -589,9 +584,9 @@ pub extern "C" fn flexspline_predict(
         if !numbers.iter().chain(&from.state_bound).chain([&bound]).all(|number| number.is_finite()) {
             return Err(FlexsplineStatus::Argument);
         }
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
-        let state: &JointState = get(state, STATE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
+        let state: &JointState = get(state, Object::State)?;
         let off = Disturbance {
             torque_n_m: from.torque_off_n_m,
             load_change_n_m: from.load_change_n_m,

@@ -1,8 +1,8 @@
 //! From the register of an encoder to an angle and back; angles in other units; rate groups.
 
 use super::{
-    FlexsplineJoint, FlexsplineState, FlexsplineStatus, JOINT_MARK, STATE_MARK, apart, copied, get, get_mut, give, put,
-    span, status, usable,
+    FlexsplineJoint, FlexsplineState, FlexsplineStatus, Object, apart, copied, get, get_mut, give, put, span, status,
+    usable,
 };
 use core::mem::MaybeUninit;
 use flexspline::{Encoder, EncoderSettings, EncoderState, EncoderWrap, Joint, JointState, OutputAngle};
@@ -40,8 +40,6 @@ struct Followed {
     at: EncoderState,
 }
 
-const ENCODER_MARK: u32 = 0x7845_5446;
-
 /// Makes an encoder of its settings, `FLEXSPLINE_STATUS_ARGUMENT` if they cannot be; where it is is not known yet.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_encoder_init(
@@ -60,7 +58,7 @@ pub extern "C" fn flexspline_encoder_init(
             zero_counts: s.zero_counts,
         };
         let made = Encoder::new(settings).map_err(|_| FlexsplineStatus::Argument)?;
-        put(encoder, ENCODER_MARK, Followed { encoder: made, at: EncoderState::NOWHERE })
+        put(encoder, Object::Encoder, Followed { encoder: made, at: EncoderState::NOWHERE })
     };
     status(make())
 }
@@ -74,7 +72,7 @@ pub extern "C" fn flexspline_encoder_start(
     near_counts: i64,
 ) -> FlexsplineStatus {
     let start = || {
-        let followed: &mut Followed = get_mut(encoder, ENCODER_MARK)?;
+        let followed: &mut Followed = get_mut(encoder, Object::Encoder)?;
         if !followed.encoder.mend() {
             return Err(FlexsplineStatus::NotInitialised);
         }
@@ -106,8 +104,8 @@ pub extern "C" fn flexspline_joint_read(
     let read = || {
         apart([span(encoder), span(angle_counts), span(joint), span(state)])?;
         usable(angle_counts)?;
-        let (joint, state): (&Joint, &JointState) = (get(joint, JOINT_MARK)?, get(state, STATE_MARK)?);
-        let Followed { encoder, at } = get_mut(encoder, ENCODER_MARK)?;
+        let (joint, state): (&Joint, &JointState) = (get(joint, Object::Joint)?, get(state, Object::State)?);
+        let Followed { encoder, at } = get_mut(encoder, Object::Encoder)?;
         if !encoder.mend() || at.is_lost() || joint.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
@@ -133,7 +131,7 @@ pub extern "C" fn flexspline_encoder_read(
     let read = || {
         apart([span(encoder), span(angle_counts)])?;
         usable(angle_counts)?;
-        let Followed { encoder, at } = get_mut(encoder, ENCODER_MARK)?;
+        let Followed { encoder, at } = get_mut(encoder, Object::Encoder)?;
         if !encoder.mend() || at.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
@@ -154,7 +152,7 @@ pub extern "C" fn flexspline_encoder_reading(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(encoder), span(reading)])?;
-        let followed: &Followed = get(encoder, ENCODER_MARK)?;
+        let followed: &Followed = get(encoder, Object::Encoder)?;
         if followed.encoder.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }

@@ -1,9 +1,9 @@
 //! Additions to the table: coefficients learnt from measurements of the output, and springs that slip.
 
 use super::{
-    FlexsplineInput, FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK,
-    STATE_MARK, STORE_MARK, apart, bytes, bytes_mut, clear, copied, core_input, get, get_mut, give, given, list, put,
-    restore_status, span, status, usable,
+    FlexsplineInput, FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object,
+    apart, bytes, bytes_mut, clear, copied, core_input, get, get_mut, give, given, list, put, restore_status, span,
+    status, usable,
 };
 use core::mem::MaybeUninit;
 use flexspline::{Adjustment, Joint, JointState, OutputAngle, Store, TableId};
@@ -230,10 +230,6 @@ struct CSprings {
     used: u8,
 }
 
-pub(super) const ADJUSTMENT_MARK: u32 = 0x7844_5446;
-const LEARNER_MARK: u32 = 0x784c_5446;
-const SLIP_MARK: u32 = 0x7842_5446;
-
 const _: () = {
     assert!(FLEXSPLINE_SAVED_LEARNER_BYTES == saved_adapt_bytes(MOST));
     assert!(FLEXSPLINE_SAVED_SLIP_BYTES == saved_slip_bytes(SPRINGS));
@@ -278,7 +274,7 @@ pub extern "C" fn flexspline_learner_init(
         };
         let adapter =
             OnlineCalibration::of_first(&settings, number as usize).map_err(|_| FlexsplineStatus::Argument)?;
-        put(learner, LEARNER_MARK, Learner { adapter, state: adapter.start(), used: number })
+        put(learner, Object::Learner, Learner { adapter, state: adapter.start(), used: number })
     };
     status(make())
 }
@@ -287,7 +283,7 @@ pub extern "C" fn flexspline_learner_init(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learning: u8) -> FlexsplineStatus {
     let set = || {
-        let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
+        let learner: &mut Learner = get_mut(learner, Object::Learner)?;
         let found = LEARNING.into_iter().find(|(code, _)| *code == learning);
         let (_, learning) = found.ok_or(FlexsplineStatus::Argument)?;
         learner.state.set_learning(learning);
@@ -312,9 +308,9 @@ pub extern "C" fn flexspline_learner_bind(
         for object in [span(joint), span(store)] {
             apart([span(learner), object])?;
         }
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
-        let Learner { adapter, state, .. } = get_mut(learner, LEARNER_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
+        let Learner { adapter, state, .. } = get_mut(learner, Object::Learner)?;
         if store.id() == TableId::default() {
             return Err(FlexsplineStatus::Argument);
         }
@@ -333,7 +329,7 @@ pub extern "C" fn flexspline_learner_bind(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_reset(learner: *mut FlexsplineLearner) -> FlexsplineStatus {
     let reset = || {
-        let Learner { adapter, state, .. } = get_mut(learner, LEARNER_MARK)?;
+        let Learner { adapter, state, .. } = get_mut(learner, Object::Learner)?;
         adapter.reset(state);
         Ok(())
     };
@@ -362,8 +358,8 @@ pub extern "C" fn flexspline_learner_update(
         apart([span(learner), span(adapted)])?;
         usable(adapted)?;
         let (input, output) = (core_input(&copied(input)?), given(output)?);
-        let state: &JointState = get(state, STATE_MARK)?;
-        let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
+        let state: &JointState = get(state, Object::State)?;
+        let learner: &mut Learner = get_mut(learner, Object::Learner)?;
         let measured = (has_measured != 0).then_some(OutputAngle::from_counts(measured_counts));
         let seen = Seen { input: &input, play: state.play(), output: &output, measured };
         let found = learner.adapter.update(&mut learner.state, &seen);
@@ -399,7 +395,7 @@ pub extern "C" fn flexspline_learner_coefficient(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(learner), span(learnt)])?;
-        let learner: &Learner = get(learner, LEARNER_MARK)?;
+        let learner: &Learner = get(learner, Object::Learner)?;
         let found = learner.adapter.coefficients(&learner.state);
         let known = found.iter().take(learner.used as usize).nth(place as usize);
         let &(value, std) = known.ok_or(FlexsplineStatus::Argument)?;
@@ -416,7 +412,7 @@ pub extern "C" fn flexspline_learner_report(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(learner), span(report)])?;
-        let learner: &Learner = get(learner, LEARNER_MARK)?;
+        let learner: &Learner = get(learner, Object::Learner)?;
         let (counters, now) = (learner.state.counters(), learner.state.learning());
         let learning = LEARNING.into_iter().find(|(_, learning)| *learning == now).map_or(0, |(code, _)| code);
         give(
@@ -452,7 +448,7 @@ pub extern "C" fn flexspline_learner_save(
         usable(written)?;
         let room = (saved as usize, saved_bytes);
         apart([span(learner), room, span(written)])?;
-        let learner: &Learner = get(learner, LEARNER_MARK)?;
+        let learner: &Learner = get(learner, Object::Learner)?;
         let room = bytes_mut(saved, saved_bytes)?;
         let took = learner.adapter.save_first(&learner.state, learner.used as usize, room);
         give(written, took.ok_or(FlexsplineStatus::TooLarge)?)
@@ -473,7 +469,7 @@ pub extern "C" fn flexspline_learner_restore(
     let restore = || {
         apart([span(learner), (saved as usize, saved_bytes)])?;
         let kept = bytes(saved, saved_bytes)?;
-        let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
+        let learner: &mut Learner = get_mut(learner, Object::Learner)?;
         let found = learner.adapter.restore_first(learner.used as usize, kept);
         learner.state = found.map_err(|error| match error {
             AdaptRestoreError::OtherTable => FlexsplineStatus::OtherTable,
@@ -508,7 +504,7 @@ pub extern "C" fn flexspline_slip_init(
             }
             _ => None,
         };
-        put(slip, SLIP_MARK, CSprings { bank: bank.ok_or(FlexsplineStatus::Argument)?, used: number })
+        put(slip, Object::Slip, CSprings { bank: bank.ok_or(FlexsplineStatus::Argument)?, used: number })
     };
     status(make())
 }
@@ -518,7 +514,7 @@ pub extern "C" fn flexspline_slip_init(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_set(slip: *mut FlexsplineSlip, is_relaxed: u8) -> FlexsplineStatus {
     let set = || {
-        let CSprings { bank, .. } = get_mut(slip, SLIP_MARK)?;
+        let CSprings { bank, .. } = get_mut(slip, Object::Slip)?;
         if is_relaxed > 1 {
             return Err(FlexsplineStatus::Argument);
         }
@@ -544,7 +540,7 @@ fn slip_tick(
     let tick = || {
         apart([span(slip), span(report)])?;
         usable(report)?;
-        let CSprings { bank, .. } = get_mut(slip, SLIP_MARK)?;
+        let CSprings { bank, .. } = get_mut(slip, Object::Slip)?;
         let (found, is_known) = follow(bank)?;
         let Slip { error_rad, uncertainty_rad } = found;
         let (mean_counts, is_known) = (found.mean_counts(), is_known as u8);
@@ -613,7 +609,7 @@ pub(super) fn save_slip(
 ) -> Result<(), FlexsplineStatus> {
     usable(written)?;
     apart([span(slip), (saved as usize, saved_bytes), span(written)])?;
-    let &CSprings { ref bank, used } = get(slip, SLIP_MARK)?;
+    let &CSprings { ref bank, used } = get(slip, Object::Slip)?;
     let (room, used) = (bytes_mut(saved, saved_bytes)?, used as usize);
     let (took, is_lost) = match bank {
         Bank::Output(bank, state) => (bank.save_first(state, owner, used, room), bank.is_lost() || state.is_lost()),
@@ -649,7 +645,7 @@ pub(super) fn restore_slip(
 ) -> Result<(), FlexsplineStatus> {
     apart([span(slip), (saved as usize, saved_bytes)])?;
     let kept = bytes(saved, saved_bytes)?;
-    let CSprings { bank, used } = get_mut(slip, SLIP_MARK)?;
+    let CSprings { bank, used } = get_mut(slip, Object::Slip)?;
     let used = *used as usize;
     match bank {
         Bank::Output(bank, state) => *state = bank.restore_first(owner, used, kept).map_err(restore_status)?,
@@ -661,7 +657,7 @@ pub(super) fn restore_slip(
 /// Makes an adjustment that adds nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_adjustment_init(adjustment: *mut FlexsplineAdjustment) -> FlexsplineStatus {
-    status(put(adjustment, ADJUSTMENT_MARK, Adjustment::default()))
+    status(put(adjustment, Object::Adjustment, Adjustment::default()))
 }
 
 /// Adds to an adjustment, counts of 2^-32 turn at the output, each sum held within +-0.049 rad; and to its uncertainty,
@@ -675,7 +671,7 @@ pub extern "C" fn flexspline_adjustment_add(
     uncertainty_rad: f32,
 ) -> FlexsplineStatus {
     let add = || {
-        let adjustment: &mut Adjustment = get_mut(adjustment, ADJUSTMENT_MARK)?;
+        let adjustment: &mut Adjustment = get_mut(adjustment, Object::Adjustment)?;
         let added = Adjustment::new(mean_counts, half_width_counts);
         *adjustment = adjustment.plus(added).with_uncertainty(uncertainty_rad);
         Ok(())

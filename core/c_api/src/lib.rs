@@ -52,9 +52,8 @@ use core::mem::{MaybeUninit, align_of, size_of};
 use flexspline::{
     ActivateError, Activation, Adjustment, Counters, Drive, FixedMember, Flags, GeneratorAngle, Identity,
     IdentityCheck, ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, Progress,
-    RestoreError, SAVED_JOINT_BYTES, Store, mend_page, self_test,
+    RestoreError, Store, self_test,
 };
-use learn::ADJUSTMENT_MARK;
 
 #[cfg(all(target_os = "none", not(test)))]
 use panic_never as _;
@@ -313,13 +312,56 @@ struct Marked<T> {
     value: T,
 }
 
-const STORE_MARK: u32 = 0x7853_5446;
-const JOINT_MARK: u32 = 0x784a_5446;
-const STATE_MARK: u32 = 0x7841_5446;
-const ACTIVATION_MARK: u32 = 0x7856_5446;
-const IDENTITY_MARK: u32 = 0x7849_5446;
+/// An object of the caller, by the mark that shows that it was initialised. Each has its campaign of upsets
+/// (`tests/campaign.rs`).
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+#[allow(missing_docs)]
+pub enum Object {
+    Store = 0x7853_5446,
+    Joint = 0x784a_5446,
+    State = 0x7841_5446,
+    Activation = 0x7856_5446,
+    Identity = 0x7849_5446,
+    Adjustment = 0x7844_5446,
+    Learner = 0x784c_5446,
+    Slip = 0x7842_5446,
+    Encoder = 0x7845_5446,
+    TorquePath = 0x7854_5446,
+    Aged = 0x7847_5446,
+    Upload = 0x7855_5446,
+    Watch = 0x7857_5446,
+    Predictor = 0x7850_5446,
+    Observer = 0x784f_5446,
+    Recorder = 0x7852_5446,
+    StartUp = 0x7843_5446,
+}
 
-const _: () = assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
+const _: () = assert!(FLEXSPLINE_SAVED_BYTES == JointState::SAVED_BYTES);
+
+impl Object {
+    /// All of them.
+    pub const ALL: [Self; 17] = [
+        Self::Store,
+        Self::Joint,
+        Self::State,
+        Self::Activation,
+        Self::Identity,
+        Self::Adjustment,
+        Self::Learner,
+        Self::Slip,
+        Self::Encoder,
+        Self::TorquePath,
+        Self::Aged,
+        Self::Upload,
+        Self::Watch,
+        Self::Predictor,
+        Self::Observer,
+        Self::Recorder,
+        Self::StartUp,
+    ];
+}
 
 /// Whether a value with its mark has room in an opaque object.
 const fn fits<O, T>() -> bool {
@@ -327,14 +369,14 @@ const fn fits<O, T>() -> bool {
 }
 
 /// Marks in memory: any two differ in enough bits (a test counts them) that one bit of one may flip.
-const fn spread(mark: u32) -> u32 {
-    mark.wrapping_mul(0x9e37_79b1)
+const fn spread(object: Object) -> u32 {
+    (object as u32).wrapping_mul(0x9e37_79b1)
 }
 
 /// Whether a mark is this one, but for a bit that an upset turned: a call that writes the object makes it anew.
 #[inline(always)]
-const fn is_marked(found: u32, mark: u32) -> bool {
-    let off = found ^ spread(mark);
+const fn is_marked(found: u32, object: Object) -> bool {
+    let off = found ^ spread(object);
     off & off.wrapping_sub(1) == 0
 }
 
@@ -357,7 +399,7 @@ fn apart<const N: usize>(objects: [(usize, usize); N]) -> Result<(), FlexsplineS
 }
 
 /// Writes a marked value into an opaque object.
-fn put<O, T>(object: *mut O, mark: u32, value: T) -> Result<(), FlexsplineStatus> {
+fn put<O, T>(object: *mut O, mark: Object, value: T) -> Result<(), FlexsplineStatus> {
     const { assert!(fits::<O, T>()) };
     usable(object)?;
     // SAFETY: not null, aligned for `O`, in which the value has room; the caller owns it.
@@ -366,7 +408,7 @@ fn put<O, T>(object: *mut O, mark: u32, value: T) -> Result<(), FlexsplineStatus
 }
 
 /// The value in an opaque object, to read.
-fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus> {
+fn get<'a, O, T>(object: *const O, mark: Object) -> Result<&'a T, FlexsplineStatus> {
     usable(object)?;
     let marked = object.cast::<Marked<T>>();
     // SAFETY: not null and aligned, and all bytes of the mark are a number whatever they are. Nothing else is looked at
@@ -379,7 +421,7 @@ fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus>
 }
 
 /// The object behind a pointer, to write.
-fn get_mut<'a, O, T>(object: *mut O, mark: u32) -> Result<&'a mut T, FlexsplineStatus> {
+fn get_mut<'a, O, T>(object: *mut O, mark: Object) -> Result<&'a mut T, FlexsplineStatus> {
     get::<O, T>(object, mark)?;
     // SAFETY: as in `get`; the callers see to it that nothing else refers to it during the call.
     let marked = unsafe { &mut *object.cast::<Marked<T>>() };
@@ -486,7 +528,7 @@ pub extern "C" fn flexspline_store_init(store: *mut FlexsplineStore) -> Flexspli
             marked.write_bytes(0, 1);
             &mut *marked
         };
-        marked.mark = spread(STORE_MARK);
+        marked.mark = spread(Object::Store);
         Ok(())
     };
     status(init())
@@ -521,7 +563,7 @@ pub extern "C" fn flexspline_joint_init(
         };
         let argument = FlexsplineStatus::Argument;
         let drive = Drive::new(s.flexspline_teeth, s.circular_spline_teeth, fixed).map_err(|_| argument)?;
-        put(joint, JOINT_MARK, Joint::new(drive, limits, overrun).map_err(|_| argument)?)
+        put(joint, Object::Joint, Joint::new(drive, limits, overrun).map_err(|_| argument)?)
     };
     status(make())
 }
@@ -534,7 +576,7 @@ pub extern "C" fn flexspline_joint_init(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_limit_acceleration(joint: *mut FlexsplineJoint, rad_s2: f32) -> FlexsplineStatus {
     let limit = || {
-        let joint: &mut Joint = get_mut(joint, JOINT_MARK)?;
+        let joint: &mut Joint = get_mut(joint, Object::Joint)?;
         *joint = joint.with_generator_acceleration(rad_s2).map_err(|_| FlexsplineStatus::Argument)?;
         Ok(())
     };
@@ -544,7 +586,7 @@ pub extern "C" fn flexspline_joint_limit_acceleration(joint: *mut FlexsplineJoin
 /// Makes the state of a joint after a reset.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_init(state: *mut FlexsplineState) -> FlexsplineStatus {
-    status(put(state, STATE_MARK, JointState::new()))
+    status(put(state, Object::State, JointState::new()))
 }
 
 /// Checks the images and fills the store from them, between two ticks. If it fails the table in use stays.
@@ -558,8 +600,8 @@ pub extern "C" fn flexspline_store_activate(
     let activate = || {
         apart([span(store), span(joint)])?;
         let images = images(table, [span(store)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &mut Store = get_mut(store, Object::Store)?;
         store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(activate_status)
     };
     status(activate())
@@ -587,9 +629,9 @@ pub extern "C" fn flexspline_activation_begin(
 ) -> FlexsplineStatus {
     let begin = || {
         apart([span(activation), span(joint)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
         let begun = Store::begin(joint.drive(), temperature_c).map_err(activate_status)?;
-        put(activation, ACTIVATION_MARK, begun)
+        put(activation, Object::Activation, begun)
     };
     status(begin())
 }
@@ -607,8 +649,8 @@ pub extern "C" fn flexspline_activation_step(
         apart([span(activation), span(store), span(progress)])?;
         usable(progress)?;
         let images = images(table, [span(activation), span(store), span(progress)])?;
-        let activation: &mut Activation = get_mut(activation, ACTIVATION_MARK)?;
-        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        let activation: &mut Activation = get_mut(activation, Object::Activation)?;
+        let store: &mut Store = get_mut(store, Object::Store)?;
         let code = match activation.step(store, &images).map_err(activate_status)? {
             Progress::Checking => FLEXSPLINE_PROGRESS_CHECKING,
             Progress::Filling => FLEXSPLINE_PROGRESS_FILLING,
@@ -622,7 +664,7 @@ pub extern "C" fn flexspline_activation_step(
 /// Begins to find out whether an image is the one of its id.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_identity_begin(identity: *mut FlexsplineIdentity) -> FlexsplineStatus {
-    status(put(identity, IDENTITY_MARK, IdentityCheck::new()))
+    status(put(identity, Object::Identity, IdentityCheck::new()))
 }
 
 /// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is
@@ -638,7 +680,7 @@ pub extern "C" fn flexspline_identity_step(
         apart([span(identity), span(found), (image as usize, image_bytes)])?;
         usable(found)?;
         let image = bytes(image, image_bytes)?;
-        let identity: &mut IdentityCheck = get_mut(identity, IDENTITY_MARK)?;
+        let identity: &mut IdentityCheck = get_mut(identity, Object::Identity)?;
         let code = match identity.step(image) {
             Identity::Hashing => FLEXSPLINE_IDENTITY_HASHING,
             Identity::Same(_) => FLEXSPLINE_IDENTITY_SAME,
@@ -664,7 +706,7 @@ pub extern "C" fn flexspline_store_set_temperature(
 ) -> FlexsplineStatus {
     let set = || {
         let images = images(table, [span(store)])?;
-        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        let store: &mut Store = get_mut(store, Object::Store)?;
         if store.set_temperature(&images, temperature_c) { Ok(()) } else { Err(FlexsplineStatus::Argument) }
     };
     status(set())
@@ -679,7 +721,7 @@ pub extern "C" fn flexspline_store_check_images(
 ) -> FlexsplineStatus {
     let check = || {
         let images = images(table, [span(store)])?;
-        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        let store: &mut Store = get_mut(store, Object::Store)?;
         store.check_images(&images, words as usize);
         Ok(())
     };
@@ -694,7 +736,7 @@ pub extern "C" fn flexspline_store_report(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(store), span(report)])?;
-        let store: &Store = get(store, STORE_MARK)?;
+        let store: &Store = get(store, Object::Store)?;
         let Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes } = store.counters();
         let (image, page) = store.damaged_page().unwrap_or((255, 0));
         let filled = FlexsplineStoreReport {
@@ -728,11 +770,11 @@ pub extern "C" fn flexspline_store_mend_page(
         usable(damaged)?;
         let good_bytes = bytes(good, length)?;
         apart([span(store), (damaged as usize, length), (good as usize, length)])?;
-        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        let store: &mut Store = get_mut(store, Object::Store)?;
         // SAFETY: not null, apart from the other image and the store; the caller guarantees this length, and
         // they are its own.
         let damaged = unsafe { core::slice::from_raw_parts_mut(damaged, length) };
-        if image > 1 || !mend_page(damaged, good_bytes, page as usize) {
+        if image > 1 || !Images::mend_page(damaged, good_bytes, page as usize) {
             return Err(FlexsplineStatus::Argument);
         }
         store.mended(image as usize, page as usize);
@@ -746,7 +788,7 @@ pub extern "C" fn flexspline_store_mend_page(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_mend(joint: *mut FlexsplineJoint) -> FlexsplineStatus {
     let mend = || {
-        let joint: &mut Joint = get_mut(joint, JOINT_MARK)?;
+        let joint: &mut Joint = get_mut(joint, Object::Joint)?;
         if joint.mend() { Ok(()) } else { Err(FlexsplineStatus::Argument) }
     };
     status(mend())
@@ -757,7 +799,7 @@ pub extern "C" fn flexspline_joint_mend(joint: *mut FlexsplineJoint) -> Flexspli
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_request(state: *mut FlexsplineState, mode: u8) -> FlexsplineStatus {
     let request = || {
-        let state: &mut JointState = get_mut(state, STATE_MARK)?;
+        let state: &mut JointState = get_mut(state, Object::State)?;
         if mode > FLEXSPLINE_MODE_SAFE {
             return Err(FlexsplineStatus::Argument);
         }
@@ -770,7 +812,7 @@ pub extern "C" fn flexspline_state_request(state: *mut FlexsplineState, mode: u8
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_forget_side(state: *mut FlexsplineState) -> FlexsplineStatus {
     let forget = || {
-        let state: &mut JointState = get_mut(state, STATE_MARK)?;
+        let state: &mut JointState = get_mut(state, Object::State)?;
         state.forget_side();
         Ok(())
     };
@@ -785,7 +827,7 @@ pub extern "C" fn flexspline_state_report(
 ) -> FlexsplineStatus {
     let fill = || {
         apart([span(state), span(report)])?;
-        let state: &JointState = get(state, STATE_MARK)?;
+        let state: &JointState = get(state, Object::State)?;
         let filled = FlexsplineStateReport {
             missed_ticks: state.missed_ticks(),
             mode: state.mode().code() as u8,
@@ -808,9 +850,9 @@ pub extern "C" fn flexspline_state_save(
         for object in [span(state), span(joint), span(store)] {
             apart([object, span(saved)])?;
         }
-        let state: &JointState = get(state, STATE_MARK)?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
+        let state: &JointState = get(state, Object::State)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
         give(saved, state.save(joint, store))
     };
     status(save())
@@ -829,10 +871,10 @@ pub extern "C" fn flexspline_state_restore(
         for object in [span(joint), span(store), span(saved)] {
             apart([span(state), object])?;
         }
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
         let restored = JointState::restore(&copied(saved)?, joint, store).map_err(restore_status)?;
-        put(state, STATE_MARK, restored)
+        put(state, Object::State, restored)
     };
     status(restore())
 }
@@ -909,12 +951,12 @@ fn tick(
             clear(span(own), [span(store), span(state), span(output)])?;
         }
         let input = copied(input)?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &mut Store = get_mut(store, STORE_MARK)?;
-        let state: &mut JointState = get_mut(state, STATE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &mut Store = get_mut(store, Object::Store)?;
+        let state: &mut JointState = get_mut(state, Object::State)?;
         let mut input = core_input(&input);
         if let Some(own) = adjustment {
-            let own: &Adjustment = get(own, ADJUSTMENT_MARK)?;
+            let own: &Adjustment = get(own, Object::Adjustment)?;
             input.adjustment = input.adjustment.plus(*own);
         }
         let found = joint.tick(&images, store, state, &input);
@@ -1156,7 +1198,7 @@ mod tests {
         };
         assert_eq!(report(&o.store).health, 3);
         // An empty store is the one of Rust.
-        let empty: &Store = get(&*o.store, STORE_MARK).unwrap();
+        let empty: &Store = get(&*o.store, Object::Store).unwrap();
         assert_eq!(std::format!("{empty:?}"), std::format!("{:?}", Store::new()));
         let bad = flexspline_store_activate(&mut *o.store, &o.joint, &table(&images), f32::NAN);
         assert_eq!((bad, report(&o.store).health), (FlexsplineStatus::Argument, 3));
@@ -1184,7 +1226,10 @@ mod tests {
         let text = |name: *const core::ffi::c_char| unsafe { core::ffi::CStr::from_ptr(name) }.to_str().unwrap();
         assert_eq!(text(flexspline_version()), env!("CARGO_PKG_VERSION"));
         assert_eq!([text(flexspline_mode_name(3)), text(flexspline_health_name(4))], ["safe", "torn"]);
-        assert_eq!((flexspline_format_version(), text(flexspline_mode_name(9))), (flexspline::FORMAT_VERSION, "?"));
+        assert_eq!(
+            (flexspline_format_version(), text(flexspline_mode_name(9))),
+            (flexspline::Table::FORMAT_VERSION, "?")
+        );
         let flags = [Flags::SAMPLE_LOST, Flags::TABLE_DOUBT, Flags::JOINT_TORN, Flags::SAFE, Flags::OTHER_IMAGES];
         let names = ["sample lost", "table doubt", "joint torn", "safe", "other images"];
         assert!(flags.iter().zip(names).all(|(flag, name)| text(flexspline_flag_name(flag.bits())) == name));
@@ -1270,7 +1315,7 @@ mod tests {
                 let settings = FlexsplineSettings { fixed_member, overrun, ..SETTINGS };
                 assert_eq!(flexspline_joint_init(&mut o.joint, &settings), FlexsplineStatus::Ok);
                 let expected = Joint::new(Drive::new(188, 190, member).unwrap(), LIMITS, policy).unwrap();
-                assert_eq!(get::<_, Joint>(&o.joint, JOINT_MARK), Ok(&expected), "{fixed_member} {overrun}");
+                assert_eq!(get::<_, Joint>(&o.joint, Object::Joint), Ok(&expected), "{fixed_member} {overrun}");
             }
         }
     }
@@ -1281,7 +1326,7 @@ mod tests {
             let mut o = made();
             assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
             assert_eq!(flexspline_state_request(&mut o.state, number), FlexsplineStatus::Ok);
-            assert_eq!(get::<_, JointState>(&o.state, STATE_MARK).unwrap().mode(), mode);
+            assert_eq!(get::<_, JointState>(&o.state, Object::State).unwrap().mode(), mode);
         }
     }
 

@@ -262,7 +262,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
         }
         own = adapted.adjustment;
         adjustment = slip_torque.added_to(slip.added_to(own));
-        assert_eq!(get::<_, Adjustment>(&c_adjustment, ADJUSTMENT_MARK), Ok(&adjustment));
+        assert_eq!(get::<_, Adjustment>(&c_adjustment, Object::Adjustment), Ok(&adjustment));
 
         let c_measured =
             FlexsplineMeasured { torque_n_m: load, speed_rad_s: 0.02 * direction as f32, twist_rad: load * 3e-5 };
@@ -397,7 +397,7 @@ fn questions(
     let asked = flexspline_motion_ahead(&o.joint, &*o.store, target, -0.01, 0.2, torque, 4e-3, &mut ahead);
     let expected = joint.motion_ahead(store, OutputAngle::from_counts(target), [-0.01, 0.2], torque, 4e-3);
     assert_eq!(asked, Done);
-    assert_eq!((ahead.rate_rad_s, ahead.acceleration_rad_s2), (expected.rate_rad_s, expected.acceleration_rad_s2));
+    assert_eq!([ahead.rate_rad_s, ahead.acceleration_rad_s2], expected);
     let (mut play, mut back) = (FlexsplinePlay::default(), 0);
     assert_eq!(flexspline_state_play(&o.state, &mut play), Done);
     let expected = state.play();
@@ -440,27 +440,10 @@ fn an_image_tells_what_it_is() {
 /// the mark anew.
 #[test]
 fn a_bit_of_a_mark_refuses_nothing() {
-    let marks = [
-        STORE_MARK,
-        JOINT_MARK,
-        STATE_MARK,
-        ACTIVATION_MARK,
-        IDENTITY_MARK,
-        0x7855_5446,
-        0x7857_5446,
-        0x7850_5446,
-        0x784f_5446,
-        0x784c_5446,
-        0x7842_5446,
-        0x7845_5446,
-        0x7854_5446,
-        0x7847_5446,
-        0x7852_5446,
-        0x7843_5446,
-    ];
+    let marks = Object::ALL;
     for (i, one) in marks.iter().enumerate() {
         for other in marks[..i].iter().map(|other| spread(*other)).chain([0, u32::MAX, 0x5a5a_5a5a]) {
-            assert!((spread(*one) ^ other).count_ones() >= 4, "{one:x} {other:x}");
+            assert!((spread(*one) ^ other).count_ones() >= 4, "{one:?} {other:x}");
         }
     }
     let image = fixture::image(false);
@@ -478,7 +461,7 @@ fn a_bit_of_a_mark_refuses_nothing() {
         assert_eq!(flexspline_joint_mend(&mut o.joint), Done);
         // SAFETY: as above.
         let found = marks(&mut o).map(|mark| unsafe { *mark });
-        assert_eq!(found, [STORE_MARK, JOINT_MARK, STATE_MARK].map(spread), "{bit}");
+        assert_eq!(found, [Object::Store, Object::Joint, Object::State].map(spread), "{bit}");
     }
     // SAFETY: as above.
     unsafe { *(&raw mut o.state).cast::<u32>() ^= 3 };
@@ -664,7 +647,7 @@ fn what_is_not_allowed_is_refused() {
         assert_eq!(after, bound[1]);
     }
     assert_eq!(flexspline_learner_reset(&mut learner), Done);
-    let (joint, empty) = (get(&o.joint, JOINT_MARK).unwrap(), Store::new());
+    let (joint, empty) = (get(&o.joint, Object::Joint).unwrap(), Store::new());
     let other: Result<AdaptState<5>, _> = adapter(joint, &empty).restore(&bytes);
     assert!(other.is_ok());
 

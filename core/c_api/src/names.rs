@@ -11,7 +11,7 @@ use super::{FlexsplineStore, FlexsplineStoreReport};
 use super::{ask::*, beside::*, encoder::*, learn::*, safe::*, telemetry::*, torque::*};
 use core::ffi::{CStr, c_char, c_int};
 use core::mem::size_of;
-use flexspline::{FORMAT_VERSION, Mode};
+use flexspline::{Mode, Table};
 
 /// Version of this header: the first of three numbers.
 pub const FLEXSPLINE_VERSION_MAJOR: u32 = 0;
@@ -188,7 +188,7 @@ pub extern "C" fn flexspline_version_number() -> u32 {
 /// Version of the table format that is read.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_format_version() -> u16 {
-    FORMAT_VERSION
+    Table::FORMAT_VERSION
 }
 
 /// Text of a number; "?" where there is none. Static, as all texts here.

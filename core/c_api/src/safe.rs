@@ -3,8 +3,8 @@
 
 use super::learn::FlexsplineSlip;
 use super::{
-    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STORE_MARK, apart, clear, copied, get, get_mut,
-    give, put, span, status, usable,
+    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, Object, apart, clear, copied, get, get_mut, give, put, span,
+    status, usable,
 };
 use core::mem::MaybeUninit;
 use flexspline::{GeneratorAngle, Implausible, Joint, OutputAngle, Readings, StartUp, StartUpSettings, Store};
@@ -88,8 +88,6 @@ pub struct FlexsplineStartUpStep {
     pub is_done: u8,
 }
 
-const START_UP_MARK: u32 = 0x7843_5446;
-
 /// Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
 /// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to decide or too long, or the ticks too
 /// few.
@@ -103,7 +101,7 @@ pub extern "C" fn flexspline_start_up_init(
     let make = || {
         apart([span(start_up), span(joint)])?;
         let s = copied(settings)?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
         let settings = StartUpSettings {
             way_rad: s.way_rad,
             ticks: s.ticks,
@@ -111,7 +109,7 @@ pub extern "C" fn flexspline_start_up_init(
             drag_n_m: s.drag_n_m,
         };
         let made = StartUp::new(joint, GeneratorAngle::from_counts(generator_counts), &settings);
-        put(start_up, START_UP_MARK, made.map_err(|_| FlexsplineStatus::Argument)?)
+        put(start_up, Object::StartUp, made.map_err(|_| FlexsplineStatus::Argument)?)
     };
     status(make())
 }
@@ -129,7 +127,7 @@ pub extern "C" fn flexspline_start_up_step(
         apart([span(start_up), span(step)])?;
         usable(step)?;
         let r = copied(readings)?;
-        let start_up: &mut StartUp = get_mut(start_up, START_UP_MARK)?;
+        let start_up: &mut StartUp = get_mut(start_up, Object::StartUp)?;
         let readings = Readings {
             generator: (r.has_generator != 0).then_some(GeneratorAngle::from_counts(r.generator_counts)),
             output: (r.has_output != 0).then_some(OutputAngle::from_counts(r.output_counts)),
@@ -161,7 +159,8 @@ pub extern "C" fn flexspline_slip_save_for(
     let save = || {
         clear(span(written), [span(joint), span(store)])?;
         clear((saved as usize, saved_bytes), [span(joint), span(store)])?;
-        let owner = flexspline::shared::owner(get::<_, Joint>(joint, JOINT_MARK)?, get::<_, Store>(store, STORE_MARK)?);
+        let owner =
+            flexspline::shared::owner(get::<_, Joint>(joint, Object::Joint)?, get::<_, Store>(store, Object::Store)?);
         super::learn::save_slip(slip, owner, saved, saved_bytes, written)
     };
     status(save())
@@ -179,7 +178,8 @@ pub extern "C" fn flexspline_slip_restore_for(
 ) -> FlexsplineStatus {
     let restore = || {
         clear(span(slip), [span(joint), span(store)])?;
-        let owner = flexspline::shared::owner(get::<_, Joint>(joint, JOINT_MARK)?, get::<_, Store>(store, STORE_MARK)?);
+        let owner =
+            flexspline::shared::owner(get::<_, Joint>(joint, Object::Joint)?, get::<_, Store>(store, Object::Store)?);
         super::learn::restore_slip(slip, owner, saved, saved_bytes)
     };
     status(restore())

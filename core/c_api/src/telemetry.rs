@@ -3,8 +3,8 @@
 use super::beside::{FLEXSPLINE_RECORD_BYTES, health_code, health_of, quality_code, quality_of};
 use super::names::FLEXSPLINE_MODE_SAFE;
 use super::{
-    FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, STATE_MARK, STORE_MARK, apart, clear, copied,
-    get, get_mut, give, given, put, span, status, usable,
+    FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object, apart, clear, copied, get, get_mut,
+    give, given, put, span, status, usable,
 };
 use core::mem::{MaybeUninit, size_of};
 use flexspline::{JointState, Mode, Store};
@@ -77,8 +77,6 @@ struct KeptRing {
     lost: u16,
     lose_new: bool,
 }
-
-const RECORDER_MARK: u32 = 0x7852_5446;
 
 fn c_record(record: &Record) -> FlexsplineRecord {
     FlexsplineRecord {
@@ -185,7 +183,7 @@ pub extern "C" fn flexspline_recorder_init(
             return Err(FlexsplineStatus::Argument);
         }
         let ring = KeptRing { divisor, offset, places, first: 0, filled: 0, number: 0, lost: 0, lose_new };
-        put(recorder, RECORDER_MARK, ring)
+        put(recorder, Object::Recorder, ring)
     };
     status(make())
 }
@@ -206,11 +204,11 @@ pub extern "C" fn flexspline_recorder_see(
         usable(records)?;
         let given = given(output)?;
         clear(span(recorder), [span(state), span(store), span(output)])?;
-        let kept: &mut KeptRing = get_mut(recorder, RECORDER_MARK)?;
+        let kept: &mut KeptRing = get_mut(recorder, Object::Recorder)?;
         let list = (records as usize, length(kept.places));
         clear(list, [span(recorder), span(state), span(store), span(output)])?;
-        let state: &JointState = get(state, STATE_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
+        let state: &JointState = get(state, Object::State)?;
+        let store: &Store = get(store, Object::Store)?;
         if at_once == 0 && !is_due(tick, kept.divisor, kept.offset) {
             return Ok(());
         }
@@ -238,7 +236,7 @@ pub extern "C" fn flexspline_recorder_take(
         usable(record)?;
         usable(is_taken)?;
         apart([span(recorder), span(record), span(is_taken)])?;
-        let kept: &mut KeptRing = get_mut(recorder, RECORDER_MARK)?;
+        let kept: &mut KeptRing = get_mut(recorder, Object::Recorder)?;
         let list = (records as usize, length(kept.places));
         clear(list, [span(recorder), span(record), span(is_taken)])?;
         let found = kept.take();

@@ -1,11 +1,11 @@
 //! Which torque a tick is given, how old it is, and the rate that goes with a command.
 
 use super::{
-    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, STORE_MARK, apart, clear, copied, get, get_mut,
-    give, put, span, status, usable,
+    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, Object, apart, clear, copied, get, get_mut, give, put, span,
+    status, usable,
 };
 use core::mem::MaybeUninit;
-use flexspline::{Aged, Direction, Joint, MotionAhead, OutputAngle, Store, TorquePath, TorqueReading, TorqueSettings};
+use flexspline::{Aged, Direction, Joint, OutputAngle, Store, TorquePath, TorqueReading, TorqueSettings};
 
 /// Eight-byte words of a [`FlexsplineTorquePath`].
 pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 8;
@@ -50,9 +50,6 @@ pub struct FlexsplineTorqueSettings {
     /// peak of the noise behind the low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
 }
-
-const TORQUE_PATH_MARK: u32 = 0x7854_5446;
-const AGED_MARK: u32 = 0x7847_5446;
 
 /// The direction of a sign: what is 0 is none.
 fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
@@ -99,7 +96,7 @@ pub extern "C" fn flexspline_torque_init_sensor(
             settle_s,
             largest_n_m,
         };
-        put(path, TORQUE_PATH_MARK, TorquePath::new(settings).map_err(|_| FlexsplineStatus::Argument)?)
+        put(path, Object::TorquePath, TorquePath::new(settings).map_err(|_| FlexsplineStatus::Argument)?)
     };
     status(make())
 }
@@ -120,7 +117,7 @@ pub extern "C" fn flexspline_torque_tick(
     let tick = || {
         apart([span(path), span(torque_n_m)])?;
         usable(torque_n_m)?;
-        let path: &mut TorquePath = get_mut(path, TORQUE_PATH_MARK)?;
+        let path: &mut TorquePath = get_mut(path, Object::TorquePath)?;
         let reading = match place {
             FLEXSPLINE_TORQUE_ON_LOAD => TorqueReading::OnLoad(reading_n_m),
             FLEXSPLINE_TORQUE_IN_MESH => TorqueReading::InMesh(reading_n_m),
@@ -149,7 +146,7 @@ pub extern "C" fn flexspline_torque_set_sensor(
     frozen_ticks: u16,
 ) -> FlexsplineStatus {
     let set = || {
-        let path: &mut TorquePath = get_mut(path, TORQUE_PATH_MARK)?;
+        let path: &mut TorquePath = get_mut(path, Object::TorquePath)?;
         if path.is_damaged() {
             return Err(FlexsplineStatus::NotInitialised);
         }
@@ -162,7 +159,7 @@ pub extern "C" fn flexspline_torque_set_sensor(
 /// Nothing measured yet; what is older than `most_ticks` is not used.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_aged_init(aged: *mut FlexsplineAged, most_ticks: u16) -> FlexsplineStatus {
-    status(put(aged, AGED_MARK, Aged::new(most_ticks)))
+    status(put(aged, Object::Aged, Aged::new(most_ticks)))
 }
 
 /// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too
@@ -178,7 +175,7 @@ pub extern "C" fn flexspline_aged_tick(
     let tick = || {
         apart([span(aged), span(value)])?;
         usable(value)?;
-        let aged: &mut Aged = get_mut(aged, AGED_MARK)?;
+        let aged: &mut Aged = get_mut(aged, Object::Aged)?;
         give(value, aged.tick((has_measured != 0).then_some(measured)))
     };
     status(tick())
@@ -189,7 +186,7 @@ pub extern "C" fn flexspline_aged_tick(
 pub extern "C" fn flexspline_aged_is_stale(aged: *const FlexsplineAged, is_stale: *mut u8) -> FlexsplineStatus {
     let fill = || {
         apart([span(aged), span(is_stale)])?;
-        let aged: &Aged = get(aged, AGED_MARK)?;
+        let aged: &Aged = get(aged, Object::Aged)?;
         give(is_stale, aged.is_stale() as u8)
     };
     status(fill())
@@ -211,8 +208,8 @@ pub extern "C" fn flexspline_rate_ahead(
 ) -> FlexsplineStatus {
     let fill = || {
         clear(span(generator_rate_rad_s), [span(joint), span(store)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
         if !(ahead_s > 0.0 && ahead_s.is_finite() && rate_rad_s.is_finite()) {
             return Err(FlexsplineStatus::Argument);
         }
@@ -249,13 +246,13 @@ pub extern "C" fn flexspline_motion_ahead(
 ) -> FlexsplineStatus {
     let fill = || {
         clear(span(ahead), [span(joint), span(store)])?;
-        let joint: &Joint = get(joint, JOINT_MARK)?;
-        let store: &Store = get(store, STORE_MARK)?;
+        let joint: &Joint = get(joint, Object::Joint)?;
+        let store: &Store = get(store, Object::Store)?;
         if !(ahead_s > 0.0 && ahead_s.is_finite() && rate_rad_s.is_finite() && acceleration_rad_s2.is_finite()) {
             return Err(FlexsplineStatus::Argument);
         }
         let target = OutputAngle::from_counts(target_counts);
-        let MotionAhead { rate_rad_s, acceleration_rad_s2 } =
+        let [rate_rad_s, acceleration_rad_s2] =
             joint.motion_ahead(store, target, [rate_rad_s, acceleration_rad_s2], torque_n_m, ahead_s);
         give(ahead, FlexsplineMotionAhead { rate_rad_s, acceleration_rad_s2 })
     };

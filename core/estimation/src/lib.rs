@@ -52,7 +52,8 @@
 //! assert!(springs.is_known());
 //! # Ok::<(), &str>(())
 //! ```
-//! Where the output will be some ticks from now, with the table as the output map of two inertias ([`TwoMassObserver`]):
+//! Where the output will be some ticks from now, with the table as the output map of two inertias
+//! ([`TwoMassObserver`]):
 //! ```
 //! use flexspline::*;
 //! use flexspline_estimation::*;
@@ -89,9 +90,6 @@
     )
 )]
 
-#[cfg(test)]
-extern crate std;
-
 mod adapt;
 #[cfg(feature = "defmt")]
 mod defmt;
@@ -127,3 +125,6 @@ pub type Predictor = TwoMassObserver;
 
 #[cfg(doc)]
 use flexspline::Adjustment;
+
+#[cfg(test)]
+extern crate std;

@@ -7,24 +7,23 @@
 //! τ̇  = 0
 //! ```
 //!
-//! All at the output; angles do not occur, so nothing drifts and nothing wraps. [`TwoMassObserver::new`] discretises that
-//! exactly over one tick, finds the gains of a stationary Kalman observer, both in double precision, and proves that
-//! the observer contracts; it is meant for the host or for start-up, and [`TwoMassObserver::check`] proves it again for one
-//! that was made elsewhere.
-//! [`TwoMassObserver::step`] is for every tick, with the motor's speed alone or with the twist measured too (output angle
-//! less nominal less the error of the table).
+//! All at the output; angles do not occur, so nothing drifts and nothing wraps. [`TwoMassObserver::new`] discretises
+//! that exactly over one tick, finds the gains of a stationary Kalman observer, both in double precision, and proves
+//! that the observer contracts; it is meant for the host or for start-up, and [`TwoMassObserver::check`] proves it
+//! again for one that was made elsewhere. [`TwoMassObserver::step`] is for every tick, with the motor's speed alone or
+//! with the twist measured too (output angle less nominal less the error of the table).
 //!
 //! # Ahead
-//! [`TwoMassObserver::ahead`] goes on without measurements, and bounds what it says: each disturbance ([`Disturbance`]) and
-//! each part of the state by its own response at the output, summed by magnitude. For this model and disturbances that
-//! stay within their bounds no smaller bound holds. [`TwoMassObserver::state_bound`] is the same sum for the observer: what
-//! its estimate can be off by.
+//! [`TwoMassObserver::ahead`] goes on without measurements, and bounds what it says: each disturbance ([`Disturbance`])
+//! and each part of the state by its own response at the output, summed by magnitude. For this model and disturbances
+//! that stay within their bounds no smaller bound holds. [`TwoMassObserver::state_bound`] is the same sum for the
+//! observer: what its estimate can be off by.
 //!
-//! [`TwoMassObserver::output_ahead`] takes the table as the output map of this model: the output is expected at the nominal
-//! output of the generator then, plus the error of the table at the torque that the spring carries then (stiffness
-//! times twist, which at rest is the load). So the play is followed, ripple and curves are those of the angle then, and
-//! the wind-up is the table's, not that of a straight spring. With an encoder at the output what it measures now takes
-//! the place of the table's error now, and only its change comes from the table.
+//! [`TwoMassObserver::output_ahead`] takes the table as the output map of this model: the output is expected at the
+//! nominal output of the generator then, plus the error of the table at the torque that the spring carries then
+//! (stiffness times twist, which at rest is the load). So the play is followed, ripple and curves are those of the
+//! angle then, and the wind-up is the table's, not that of a straight spring. With an encoder at the output what it
+//! measures now takes the place of the table's error now, and only its change comes from the table.
 //!
 //! Model and estimate are each kept under a sum ([`Sealed`]): where an upset hit one word it is mended
 //! in the next step. An estimate or a model that is lost says NaN, and a bound without end.

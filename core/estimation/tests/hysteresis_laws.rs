@@ -4,10 +4,8 @@
 
 use std::sync::LazyLock;
 
-use flexspline::{
-    Direction, Drive, FixedMember, GeneratorAngle, GeneratorKind, PlayState, Provenance, Table, TableData, image_bytes,
-    write_image,
-};
+use flexspline::{Direction, Drive, FixedMember, GeneratorAngle, GeneratorKind, PlayState, Table};
+use flexspline_make::{Provenance, TableData, image_bytes, write_image};
 use proptest::prelude::*;
 
 /// Counts of the output in half the play: 1e-4 rad.

@@ -1,10 +1,11 @@
 //! The equation that a sample gives: its unknowns and their weights.
 
 use super::plan::{MAX_HARMONICS, Plan, Sample, direction_number};
+use crate::slopes::{STENCIL, Slopes};
 use core::f64::consts::TAU;
 use flexspline::GeneratorAngle;
-use flexspline::grid::PeriodicAxis;
-use flexspline::shared::windup::{self, STENCIL, Slopes};
+use flexspline::shared::grid::PeriodicAxis;
+use flexspline::shared::windup;
 
 /// One equation: its non-zero coefficients.
 pub(super) struct SampleRow {

@@ -1,7 +1,8 @@
 //! Why samples make no table.
 
+use crate::WriteError;
 use core::fmt;
-use flexspline::{Direction, Field, ImageError, MAX_ERROR_RAD, WriteError};
+use flexspline::{Direction, Field, ImageError, Table};
 
 /// Why samples make no table. Node numbers count from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,8 +139,9 @@ impl fmt::Display for ProjectError {
             }
             Self::SampleImplausible { sample, error_rad } => write!(
                 f,
-                "sample {sample}: output is {error_rad} rad from generator/ratio, at most {MAX_ERROR_RAD} is allowed; \
-                 check ratio, units and zero"
+                "sample {sample}: output is {error_rad} rad from generator/ratio, at most {} is allowed; \
+                 check ratio, units and zero",
+                Table::MAX_ERROR_RAD
             ),
             Self::MissingNode { temperature, torque } => {
                 write!(f, "no samples at temperature node {temperature}, torque node {torque}")

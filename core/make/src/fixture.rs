@@ -1,9 +1,9 @@
 //! Samples of the drive of [`flexspline::testing::fixture`], and a plan of its table.
 
-use crate::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+use crate::{Harmonics, MissingDirection, Plan, Provenance, Sample, Workspace, make_image};
 use core::f64::consts::TAU;
-use flexspline::Direction;
-pub use flexspline::testing::fixture::{ARCSEC, PITCH, TEMPERATURES, TORQUES, drive, error, id, image, provenance};
+pub use flexspline::testing::fixture::{ARCSEC, PITCH, TEMPERATURES, TORQUES, drive, error, id, image};
+use flexspline::{Direction, GeneratorKind};
 use std::vec::Vec;
 
 pub fn sample(generator_rad: f64, torque: f64, temperature: f64, direction: Direction, long: bool) -> Sample {
@@ -54,6 +54,19 @@ pub fn plan(long: bool) -> Plan<'static> {
         missing_direction: MissingDirection::Refuse,
         negative_half_width_tolerance_rad: 0.01 * ARCSEC,
         deviation_limit_rad: 1.0 * ARCSEC,
+    }
+}
+
+pub fn provenance() -> Provenance<'static> {
+    Provenance {
+        generator_kind: GeneratorKind::Cam,
+        drive_hash: [0x5a; 32],
+        tool_version: "flexspline 0.1.0",
+        mesh_level: "closed form",
+        solver_residual: 1e-9,
+        torque_range_n_m: [-50.0, 50.0],
+        temperature_range_c: [-40.0, 80.0],
+        error_limit_rad: 0.02,
     }
 }
 

@@ -3,8 +3,9 @@
 use super::error::ProjectError;
 use super::plan::{Harmonics, Plan, take};
 use super::solve::{SampledNodes, dot};
+use crate::TableData;
 use core::f64::consts::TAU;
-use flexspline::{Direction, TableData};
+use flexspline::Direction;
 
 /// From coefficients of both directions to centre and half-width, and from harmonics to curves.
 pub(super) fn lay_out<'a>(

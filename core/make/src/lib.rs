@@ -37,8 +37,8 @@
 //! jump say nothing about either side of it; they are left out and counted.
 //!
 //! ```
-//! use flexspline_make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
-//! use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Provenance, Table};
+//! use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Table};
+//! use flexspline_make::{Harmonics, MissingDirection, Plan, Provenance, Sample, Workspace, make_image};
 //!
 //! let plan = Plan {
 //!     drive: Drive::new(188, 190, FixedMember::Flexspline).unwrap(),
@@ -107,14 +107,19 @@ mod error;
 mod fixture;
 mod lay_out;
 mod plan;
+mod slopes;
 mod solve;
 #[cfg(test)]
 mod tests;
+mod write;
 
 pub use error::ProjectError;
+pub use flexspline::shared::grid;
+pub use flexspline::shared::image::{MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, TEXT_BYTES, image_bytes};
 pub use plan::{Harmonics, MAX_HARMONICS, MissingDirection, NODES_PER_PERIOD, Plan, Sample, Workspace};
+pub use write::{Provenance, TableData, WriteError, write_image};
 
-use flexspline::{GeneratorAngle, Provenance, Table, TableData, write_image};
+use flexspline::{GeneratorAngle, Table};
 use lay_out::lay_out;
 use plan::take;
 use solve::{System, solve};

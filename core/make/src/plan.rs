@@ -1,12 +1,10 @@
 //! Specification of the table to make, its samples, and the node that a sample belongs to.
 
 use super::error::ProjectError;
-use flexspline::grid::{self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, Place};
-use flexspline::shared::{MAX_AXIS_VALUE, counted};
-use flexspline::{
-    Direction, Drive, Field, GeneratorAngle, ImageError, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
-    image_bytes,
-};
+use flexspline::shared::grid::{self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, Place};
+use flexspline::shared::image::{MAX_AXIS_VALUE, counted};
+use flexspline::shared::image::{MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, image_bytes};
+use flexspline::{Direction, Drive, Field, GeneratorAngle, ImageError, Table};
 
 /// Most harmonics of one of ψ, ψ − δ, δ.
 pub const MAX_HARMONICS: usize = 8;
@@ -202,7 +200,7 @@ impl<'a> Plan<'a> {
             }
         }
         let error_rad = self.error_rad(sample);
-        if error_rad.abs() > MAX_ERROR_RAD as f64 {
+        if error_rad.abs() > Table::MAX_ERROR_RAD as f64 {
             return Err(ProjectError::SampleImplausible { sample: index, error_rad });
         }
         Ok(())

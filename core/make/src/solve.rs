@@ -3,7 +3,7 @@
 use super::equations::{add, for_each_entry};
 use super::error::ProjectError;
 use super::plan::{Plan, Sample, direction_number};
-use flexspline::shared::windup::Slopes;
+use crate::slopes::Slopes;
 use flexspline::{Direction, GeneratorAngle};
 
 /// Conjugate gradients stop at this residual relative to the right-hand side: 1e-12 of 0.05 rad is far below 0.01″.

@@ -1,7 +1,8 @@
 use super::*;
+use crate::WriteError;
 use crate::fixture::{self, ARCSEC, Buffers, PITCH};
 use core::f64::consts::TAU;
-use flexspline::{Direction, Field, ImageError, WriteError};
+use flexspline::{Direction, Field, ImageError};
 use std::vec;
 use std::vec::Vec;
 

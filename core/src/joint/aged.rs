@@ -3,8 +3,8 @@
 /// A measurement with its age, kept twice.
 ///
 /// Call [`Self::tick`] once in every tick and give what it says to [`Input::torque_n_m`](crate::Input::torque_n_m): a
-/// torque that is too old then is none, the joint keeps its correction for `debounce_ticks` ticks, fades it out, and says so
-/// by [`Flags::NOT_CORRECTED`](crate::Flags::NOT_CORRECTED). For a temperature once for every
+/// torque that is too old then is none, the joint keeps its correction for `debounce_ticks` ticks, fades it out, and
+/// says so by [`Flags::NOT_CORRECTED`](crate::Flags::NOT_CORRECTED). For a temperature once for every
 /// [`Store::set_temperature`](crate::Store::set_temperature), which takes no NaN; [`Self::is_stale`] then asks for the
 /// sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,17 +9,9 @@ use crate::table::{Approach, Quality};
 /// Over a shorter way than this slopes are rounding of counts, rad of the output: 34 counts.
 const SHORTEST_WAY_RAD: f32 = 5e-8;
 
-/// How the generator has to move so that the output moves as it shall.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotionAhead {
-    /// Its rate, rad/s.
-    pub rate_rad_s: f32,
-    /// Its acceleration, rad/s².
-    pub acceleration_rad_s2: f32,
-}
-
 impl Joint {
-    /// As [`Self::rate_ahead`], and the acceleration that goes with it, where the target itself moves at `rate_rad_s`
+    /// Rate and acceleration of the generator, rad/s and rad/s², so that the output moves as it shall: as
+    /// [`Self::rate_ahead`], and the acceleration that goes with it, where the target itself moves at `rate_rad_s`
     /// and with `acceleration_rad_s2`:
     /// ```text
     /// dψ/dt = ψ'·v,   d²ψ/dt² = ψ''·v² + ψ'·a
@@ -38,12 +30,12 @@ impl Joint {
         [rate_rad_s, acceleration_rad_s2]: [f32; 2],
         torque_n_m: f32,
         ahead_s: f32,
-    ) -> MotionAhead {
+    ) -> [f32; 2] {
         let direction = if rate_rad_s < 0.0 { Direction::Backward } else { Direction::Forward };
         let way = self.way_rad(rate_rad_s, ahead_s);
         let at = |way: f32| self.inverse(store, target.offset_rad(way), torque_n_m, Approach::Moving(direction));
         let [before, now, after] = [at(-way), at(0.0), at(way)];
-        let nothing = MotionAhead { rate_rad_s: f32::NAN, acceleration_rad_s2: f32::NAN };
+        let nothing = [f32::NAN; 2];
         if [before, now, after].iter().any(|command| command.quality == Quality::Disabled) {
             return nothing;
         }
@@ -53,11 +45,8 @@ impl Joint {
         let bent = after.generator.minus_counts(now.generator).wrapping_sub(came) as f32 * RAD_PER_COUNT;
         let per_way = rate_rad_s / way;
         let along = if rate_rad_s == 0.0 { self.drive().ratio() } else { slope };
-        let ahead = MotionAhead {
-            rate_rad_s: slope * rate_rad_s,
-            acceleration_rad_s2: bent * per_way * per_way + along * acceleration_rad_s2,
-        };
-        if ahead.rate_rad_s.is_finite() && ahead.acceleration_rad_s2.is_finite() { ahead } else { nothing }
+        let ahead = [slope * rate_rad_s, bent * per_way * per_way + along * acceleration_rad_s2];
+        if ahead.into_iter().all(f32::is_finite) { ahead } else { nothing }
     }
 
     /// Half of the way over which slopes are taken, rad: that of the target in half of `ahead_s`, but no less than
@@ -149,21 +138,18 @@ mod tests {
         for rate in [1e-30_f32, 1e-9, -1e-7, 1e-4, 0.1, -5.0, 10.0, 1e30] {
             for ahead_s in [1e-30_f32, 1e-9, 1e-3, 4e-3, 0.1, 1e3, 1e30] {
                 let motion = joint.motion_ahead(&store, OutputAngle::ZERO, [rate, 0.1], 5.0, ahead_s);
-                let off = motion.rate_rad_s / (rate * ratio) - 1.0;
-                assert!(
-                    off.abs() < 0.1 || (rate.abs() > 1e29 && motion.rate_rad_s.is_nan()),
-                    "{rate} {ahead_s}: {motion:?}"
-                );
-                assert_eq!(motion.rate_rad_s.is_nan(), motion.acceleration_rad_s2.is_nan());
+                let off = motion[0] / (rate * ratio) - 1.0;
+                assert!(off.abs() < 0.1 || (rate.abs() > 1e29 && motion[0].is_nan()), "{rate} {ahead_s}: {motion:?}");
+                assert_eq!(motion[0].is_nan(), motion[1].is_nan());
                 let alone = joint.rate_ahead(&store, OutputAngle::ZERO, rate, 5.0, ahead_s);
-                assert!(alone == motion.rate_rad_s || motion.rate_rad_s.is_nan(), "{rate} {ahead_s}");
+                assert!(alone == motion[0] || motion[0].is_nan(), "{rate} {ahead_s}");
             }
         }
         for [rate, acceleration, ahead_s] in
             [[f32::NAN, 0.0, 1e-3], [0.1, f32::INFINITY, 1e-3], [0.1, f32::MAX, 1e-3], [0.1, 0.0, f32::NAN]]
         {
             let motion = joint.motion_ahead(&store, OutputAngle::ZERO, [rate, acceleration], 5.0, ahead_s);
-            assert!(motion.rate_rad_s.is_nan() && motion.acceleration_rad_s2.is_nan(), "{motion:?}");
+            assert!(motion[0].is_nan() && motion[1].is_nan(), "{motion:?}");
         }
     }
 
@@ -177,7 +163,7 @@ mod tests {
         let joint = Joint::new(fixture::drive(), LIMITS, Overrun::HoldLast).unwrap();
         let ask = |store: &Store, target, motion| joint.motion_ahead(store, target, motion, 5.0, 4e-3);
         let blind = ask(&store, OutputAngle::ZERO, [0.01, 0.0]);
-        assert!(blind.rate_rad_s.is_nan() && blind.acceleration_rad_s2.is_nan());
+        assert!(blind[0].is_nan() && blind[1].is_nan());
         store.activate(&images, &fixture::drive(), 20.0).unwrap();
         let ratio = fixture::drive().exact_ratio();
         let mut most = 0.0_f64;
@@ -193,22 +179,22 @@ mod tests {
                 let [came, goes] = [at(0.0).minus_counts(at(-h)), at(h).minus_counts(at(0.0))];
                 let exact = (goes - came) as f64 * core::f64::consts::TAU / 4_294_967_296.0 / (h * h);
                 let found = ask(&store, target, [rate, acceleration]);
-                assert_eq!(found.rate_rad_s, joint.rate_ahead(&store, target, rate, 5.0, 4e-3));
+                assert_eq!(found[0], joint.rate_ahead(&store, target, rate, 5.0, 4e-3));
                 // Places are counts: half of one at the output is 0.02 rad/s² of the generator over 2 ms. The way of
                 // one that accelerates is not even: where the slope (91 to 97 here) bends within 2 ms, part of its
                 // change comes in, times the target's acceleration.
-                let off = (f64::from(found.acceleration_rad_s2) - exact).abs();
+                let off = (f64::from(found[1]) - exact).abs();
                 assert!(
                     off < 0.1 + 2.5 * f64::from(acceleration.abs()),
                     "{k} {rate} {acceleration}: {found:?} {exact}"
                 );
-                most = most.max((f64::from(found.acceleration_rad_s2) - ratio * f64::from(acceleration)).abs());
+                most = most.max((f64::from(found[1]) - ratio * f64::from(acceleration)).abs());
             }
         }
         // The curvature of the error is there.
         assert!(most > 0.5, "{most}");
         let starts = ask(&store, OutputAngle::ZERO, [0.0, 0.1]);
-        assert_eq!(starts.rate_rad_s, 0.0);
-        assert!((f64::from(starts.acceleration_rad_s2) - 0.1 * ratio).abs() < 1e-4, "{starts:?}");
+        assert_eq!(starts[0], 0.0);
+        assert!((f64::from(starts[1]) - 0.1 * ratio).abs() < 1e-4, "{starts:?}");
     }
 }

@@ -15,8 +15,8 @@ impl fmt::Display for SettingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} = {}: must be finite and above zero (deadband_rad: or zero), and neither beyond what one tick can do nor \
-             too small to matter in it",
+            "{} = {}: must be finite and above zero (deadband_rad: or zero), and neither beyond what one tick can do \
+             nor too small to matter in it",
             self.name, self.found
         )
     }

@@ -13,11 +13,10 @@ mod torque_path;
 
 pub use adjustment::{Adjustment, bounded, uncertainty_counts};
 pub use aged::Aged;
-pub use feed_forward::MotionAhead;
 pub use limits::{Limits, SettingError};
 pub use mode::{Mode, ModeError, Overrun};
 pub use runtime::Joint;
 pub use signals::{Flags, Input, Output};
 pub use start_up::{Implausible, Readings, StartUp, StartUpSettings, StartUpStep};
-pub use state::{JointState, RestoreError, SAVED_JOINT_BYTES, opened, owner};
+pub use state::{JointState, RestoreError, opened, owner};
 pub use torque_path::{TorquePath, TorqueReading, TorqueSettings};

@@ -9,9 +9,9 @@
 //! | what happens | what the joint does | flag |
 //! |---|---|---|
 //! | no sample | keeps the last angle and the play; the error is known to the table's limit | [`Flags::SAMPLE_LOST`] |
-//! | a sample too far off | ignores it; after `debounce_ticks` ticks accepts it, play side unknown | [`Flags::GLITCH`] |
+//! | a sample too far off | ignores it; accepts it after `debounce_ticks`, play side unknown | [`Flags::GLITCH`] |
 //! | a sample out and back | takes back what it did to the play, in the next tick | [`Flags::GLITCH`] |
-//! | input not finite, table in doubt | keeps it for `debounce_ticks` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
+//! | input not finite, table in doubt | keeps it for `debounce_ticks`, then fades it out | [`Flags::NOT_CORRECTED`] |
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
 //! | an adjustment that is not known | adds its uncertainty | [`Uncertain`](crate::Quality::Uncertain) |
 //! | an adjustment that is lost | as an input that is not finite | [`Flags::NOT_CORRECTED`] |
@@ -105,8 +105,8 @@ impl Joint {
     }
 
     /// With a largest acceleration of the generator, rad/s²: a sample that would need more is a glitch, and one that is
-    /// out and back within two ticks is taken back. A multiple of what motor and load can do; no less than `deadband_rad`
-    /// allows for noise.
+    /// out and back within two ticks is taken back. A multiple of what motor and load can do; no less than
+    /// `deadband_rad` allows for noise.
     ///
     /// Without it a sample may need full speed in one tick, and one that is out and back a 64th of that in each.
     ///
@@ -614,7 +614,7 @@ mod tests {
     use crate::fixture::{self, ARCSEC, LIMITS};
     use crate::joint::Adjustment;
     use crate::joint::mode::ModeError;
-    use crate::joint::state::{MOST_FINE, RestoreError, SAVED_JOINT_BYTES};
+    use crate::joint::state::{MOST_FINE, RestoreError};
     use crate::table::Quality;
     use crate::upset::Upset;
     use proptest::prelude::*;
@@ -1058,7 +1058,7 @@ mod tests {
             state.flip(bit, &mut std::string::String::new());
         }
         let (forward, inverse, rate, motion, _) = answers(&joint, &run.state);
-        assert!(joint.is_lost() && rate.is_nan() && motion.acceleration_rad_s2.is_nan());
+        assert!(joint.is_lost() && rate.is_nan() && motion[1].is_nan());
         assert!([forward.quality, inverse[0].quality, inverse[1].quality] == [Quality::Disabled; 3]);
         assert_eq!((state.mode(), *state.play()), (Mode::Safe, PlayState::unknown()));
     }
@@ -1155,7 +1155,7 @@ mod tests {
         // `tick` asserts the limits across the reset.
         let on = run.run(3, 3.92e-3, -1e-5);
         assert!(on.flags.contains(Flags::HELD_BACK) && on.quality == Quality::InRange);
-        for bit in 0..SAVED_JOINT_BYTES * 8 {
+        for bit in 0..JointState::SAVED_BYTES * 8 {
             let mut damaged = saved;
             damaged[bit / 8] ^= 1 << (bit % 8);
             assert!(JointState::restore(&damaged, &run.joint, &run.store).is_err(), "bit {bit}");

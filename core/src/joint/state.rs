@@ -175,8 +175,6 @@ impl SealedState {
     }
 }
 
-/// Size of a saved joint state.
-pub const SAVED_JOINT_BYTES: usize = 72;
 /// First bytes of a saved state; the last byte is the version.
 const SAVED_MARK: [u8; 4] = *b"FXJ\x01";
 
@@ -256,6 +254,8 @@ impl Default for JointState {
 }
 
 impl JointState {
+    /// Bytes of a saved state.
+    pub const SAVED_BYTES: usize = 72;
     const NEW: [SealedState; 2] = [Kept::NEW.sealed(); 2];
 
     /// After a reset: no correction, the side of the play unknown, off.
@@ -382,7 +382,7 @@ impl JointState {
     /// | 64 | `u32` | flank: 0 none, 16 forward, 32 backward |
     /// | 68 | `u32` | CRC-32 of the 68 bytes before |
     #[must_use]
-    pub fn save(&self, joint: &Joint, store: &Store) -> [u8; SAVED_JOINT_BYTES] {
+    pub fn save(&self, joint: &Joint, store: &Store) -> [u8; Self::SAVED_BYTES] {
         let (kept, _, found) = self.open();
         let (nominal, [error, lower, upper, half]) = kept.play.parts();
         let generator = kept.generator.counts();
@@ -406,7 +406,7 @@ impl JointState {
             kept.speed as u32,
             kept.marks & FLANK,
         ];
-        let mut bytes = [0; SAVED_JOINT_BYTES];
+        let mut bytes = [0; Self::SAVED_BYTES];
         seal(&mut bytes, words);
         if found == CopyStatus::Lost {
             // It is not to come back as one that was saved.
@@ -425,7 +425,7 @@ impl JointState {
     ///
     /// # Errors
     /// [`RestoreError`]; then [`Self::new`] is left.
-    pub fn restore(bytes: &[u8; SAVED_JOINT_BYTES], joint: &Joint, store: &Store) -> Result<Self, RestoreError> {
+    pub fn restore(bytes: &[u8; Self::SAVED_BYTES], joint: &Joint, store: &Store) -> Result<Self, RestoreError> {
         let mut next = opened(bytes, SAVED_MARK, owner(joint, store))?;
         let nominal = next() as i64 | (next() as i64) << 32;
         let parts = [next(), next(), next(), next()].map(|part| part as i32);

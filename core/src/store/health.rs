@@ -45,12 +45,12 @@ pub enum ActivateError {
     Image(ImageError),
     /// The table needs more than the store has.
     TooLarge {
-        /// Words needed; [`STORE_WORDS`] are there.
+        /// Words needed; [`Store::WORDS`](crate::Store::WORDS) are there.
         needed: usize,
     },
     /// The image has more pages than the store can distinguish.
     TooManyPages {
-        /// Pages found; [`STORE_PAGES`] are allowed.
+        /// Pages found; [`Store::PAGES`](crate::Store::PAGES) are allowed.
         found: usize,
     },
     /// Each image is a table, and they differ: words of two tables would be mixed.

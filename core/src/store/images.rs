@@ -30,34 +30,34 @@ impl<'a> Images<'a> {
         first.start < second.end && second.start < first.end
     }
 
+    /// Writes a page of `good` over the same page of `damaged`, and its checksum, and returns whether it did: not if
+    /// the page of `good` is damaged too. Both are whole images of the same table. The page after the last is the
+    /// CRC-32 of the whole image, by which a store knows it ([`Flags::OTHER_IMAGES`](crate::Flags::OTHER_IMAGES)). Then
+    /// notify the store: [`Store::mended`](crate::Store::mended).
+    #[must_use]
+    pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {
+        let body_bytes = (word_at(good.as_chunks::<4>().0, word::BODY) as usize).saturating_mul(4);
+        let last = body_bytes.div_ceil(PAGE_BYTES);
+        let intact = if page == last { whole_intact(good) } else { page_intact(good, body_bytes, page) };
+        if damaged.len() != good.len() || !intact {
+            return false;
+        }
+        let sum = body_bytes.saturating_add(page.saturating_mul(4));
+        let start = page.saturating_mul(PAGE_BYTES);
+        let end = start.saturating_add(PAGE_BYTES).min(body_bytes);
+        for range in [start..end, sum..sum.saturating_add(4)] {
+            if let (Some(to), Some(from)) = (damaged.get_mut(range.clone()), good.get(range)) {
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+            }
+        }
+        true
+    }
+
     #[inline(always)]
     pub(super) fn at(&self, place: usize) -> [u32; 2] {
         let [first, second] = self.words;
         [word_at(first, place), word_at(second, place)]
     }
-}
-
-/// Writes a page of `good` over the same page of `damaged`, and its checksum, and returns whether it did: not if the
-/// page of `good` is damaged too. Both are whole images of the same table. The page after the last is the CRC-32 of the
-/// whole image, by which a store knows it ([`Flags::OTHER_IMAGES`](crate::Flags::OTHER_IMAGES)). Then notify the store:
-/// [`Store::mended`](crate::Store::mended).
-#[must_use]
-pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {
-    let body_bytes = (word_at(good.as_chunks::<4>().0, word::BODY) as usize).saturating_mul(4);
-    let last = body_bytes.div_ceil(PAGE_BYTES);
-    let intact = if page == last { whole_intact(good) } else { page_intact(good, body_bytes, page) };
-    if damaged.len() != good.len() || !intact {
-        return false;
-    }
-    let sum = body_bytes.saturating_add(page.saturating_mul(4));
-    let start = page.saturating_mul(PAGE_BYTES);
-    let end = start.saturating_add(PAGE_BYTES).min(body_bytes);
-    for range in [start..end, sum..sum.saturating_add(4)] {
-        if let (Some(to), Some(from)) = (damaged.get_mut(range.clone()), good.get(range)) {
-            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
-        }
-    }
-    true
 }
 
 /// Whether the CRC-32 of all before is at the end.

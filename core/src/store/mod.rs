@@ -8,8 +8,8 @@
 //! nothing stays wrong for longer than a pass, and the copies follow the temperature; and it goes over the CRC-32 of
 //! the pages of both images. A word that differs between the images is taken from the one whose page is intact, or not
 //! at all. A page that is damaged in one image is named, so that the firmware writes it again from the other
-//! ([`Store::damaged_page`], [`mend_page`]); one that is damaged in both is lost, the copies stay as they were, and the
-//! health says so. The work is the same in every tick, whatever is found.
+//! ([`Store::damaged_page`], [`Images::mend_page`]); one that is damaged in both is lost, the copies stay as they were,
+//! and the health says so. The work is the same in every tick, whatever is found.
 //!
 //! A new table comes in chunks ([`crate::Upload`]). It is checked in full, and filled in, in short steps between ticks
 //! ([`Store::begin`], [`Activation`]), or at once where nothing waits ([`Store::activate`]).
@@ -24,9 +24,8 @@ mod tests;
 mod upload;
 
 pub use activation::{Activation, Progress};
-pub use copies::STORE_WORDS;
-pub use health::{ActivateError, Counters, Health, STORE_PAGES};
-pub use images::{Images, mend_page};
+pub use health::{ActivateError, Counters, Health};
+pub use images::Images;
 pub use upload::{Upload, UploadError};
 
 use crate::crc::{CRC_START, crc_word};
@@ -36,7 +35,8 @@ use crate::table::{
     Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, PointPlan, TableId, TorquePlace, Words, grid, word_at,
 };
 use crate::whole::pair;
-use copies::{Copied, SLACK, agreed};
+use copies::{Copied, SLACK, STORE_WORDS, agreed};
+use health::STORE_PAGES;
 use source::{ACTIVE, Fresh, IN_RANGE, ImageSource, SealedSource, Strangers, TORN};
 
 /// Words of a page.
@@ -134,6 +134,11 @@ impl Memory for Store {
 }
 
 impl Store {
+    /// Most words of a table that it holds.
+    pub const WORDS: usize = STORE_WORDS;
+    /// Most pages of an image that it watches.
+    pub const PAGES: usize = STORE_PAGES;
+
     /// A store without a table, all zeros: every step goes without correction.
     ///
     /// In a static it takes no room in flash and none of the stack.
@@ -314,9 +319,9 @@ impl Store {
             .find_map(|(image, pages)| (pages != 0).then_some((image, pages.trailing_zeros() as usize)))
     }
 
-    /// To be called when [`mend_page`], or what writes flash in its place, has written this page of image 0 or 1 again
-    /// from an intact one. Without it the other image would be believed alone until the page is checked anew, also when
-    /// it is hit itself.
+    /// To be called when [`Images::mend_page`], or what writes flash in its place, has written this page of image 0 or
+    /// 1 again from an intact one. Without it the other image would be believed alone until the page is checked anew,
+    /// also when it is hit itself.
     pub const fn mended(&mut self, image: usize, page: usize) {
         let [first, second] = self.damaged.pages();
         let sound = !1u32.wrapping_shl(page as u32);

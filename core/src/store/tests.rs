@@ -295,7 +295,7 @@ fn campaign(flips: usize, seed: u64) -> [usize; 4] {
         hit.check_images(&seen, 64);
         if let Some((image, page)) = hit.damaged_page() {
             let good = images[1 - image].clone();
-            if mend_page(&mut images[image], &good, page) {
+            if Images::mend_page(&mut images[image], &good, page) {
                 hit.mended(image, page);
             }
         }
@@ -343,13 +343,13 @@ fn a_damaged_page_of_one_image_is_named_and_mended() {
     store.set_temperature(&images, 20.0);
     pass(&mut store, &images);
     assert!(store.first == before && store.counters().words_skipped == skipped);
-    assert!(mend_page(&mut damaged, &IMAGE, 3));
+    assert!(Images::mend_page(&mut damaged, &IMAGE, 3));
     assert_eq!(damaged, *IMAGE);
     // Not from a page that is damaged itself, nor beyond the last, nor for an image of another size.
     let mut bad = IMAGE.clone();
     bad[800] ^= 1;
     for (good, page) in [(&bad[..], 3), (&IMAGE[..], 99), (&IMAGE[4..], 3)] {
-        assert!(!mend_page(&mut damaged, good, page));
+        assert!(!Images::mend_page(&mut damaged, good, page));
         assert_eq!(damaged, *IMAGE);
     }
     let images = Images::new(&damaged, &IMAGE);
@@ -403,7 +403,7 @@ fn after_a_page_is_mended_the_other_image_is_no_longer_believed_alone() {
     store.check_images(&Images::new(&images[0], &images[1]), 2 * IMAGE.len() / 4 + 128);
     assert_eq!(store.damaged_page(), Some((0, 3)));
     let good = images[1].clone();
-    assert!(mend_page(&mut images[0], &good, 3));
+    assert!(Images::mend_page(&mut images[0], &good, 3));
     store.mended(0, 3);
     assert_eq!((store.health(), store.damaged_page()), (Health::Sound, None));
     let before = store.first.clone();
@@ -448,7 +448,7 @@ fn a_page_mended_while_it_is_checked_is_not_found_damaged() {
     // Half of page 0, with what is wrong in it.
     store.check_images(&Images::new(&images[0], &images[1]), PAGE_BYTES / 8);
     let good = images[1].clone();
-    assert!(mend_page(&mut images[0], &good, 0));
+    assert!(Images::mend_page(&mut images[0], &good, 0));
     store.mended(0, 0);
     store.check_images(&Images::new(&images[0], &images[1]), PAGE_BYTES / 4);
     assert_eq!((store.health(), store.damaged_page()), (Health::Sound, None));
@@ -458,7 +458,7 @@ fn a_page_mended_while_it_is_checked_is_not_found_damaged() {
 fn an_image_with_more_pages_than_bits_is_not_activated() {
     let torque: Vec<f32> = (0..40).map(|i| i as f32).collect();
     let zeros = std::vec![0.0; 40 * 3 * 16];
-    let data = crate::TableData {
+    let data = crate::write::TableData {
         drive: fixture::drive(),
         torque_nodes_n_m: &torque,
         temperature_nodes_c: &[-40.0, 20.0, 80.0],
@@ -473,11 +473,11 @@ fn an_image_with_more_pages_than_bits_is_not_activated() {
         projection_worst_rad: 0.0,
         projection_rms_rad: 0.0,
     };
-    let provenance = crate::Provenance { torque_range_n_m: [0.0, 39.0], ..fixture::provenance() };
-    let mut image = std::vec![0; crate::image_bytes(40, 3, 16, [0; 3])];
-    crate::write_image(&data, &provenance, &mut image, fixture::id).unwrap();
+    let provenance = crate::write::Provenance { torque_range_n_m: [0.0, 39.0], ..fixture::provenance() };
+    let mut image = std::vec![0; crate::table::image_bytes(40, 3, 16, [0; 3])];
+    crate::write::write_image(&data, &provenance, &mut image, fixture::id).unwrap();
     let pages = Table::check(&image).unwrap().page_count();
-    assert!(pages > STORE_PAGES && 64 + 40 * 22 <= STORE_WORDS, "{pages}");
+    assert!(pages > Store::PAGES && 64 + 40 * 22 <= Store::WORDS, "{pages}");
     let refused = Store::new().activate(&Images::new(&image, &image.clone()), &fixture::drive(), 20.0);
     assert_eq!(refused, Err(ActivateError::TooManyPages { found: pages }));
 }
@@ -569,10 +569,10 @@ fn the_seal_of_an_image_is_mended_like_a_page() {
     };
     assert!(reported(&Images::new(&hit, &IMAGE)) && reported(&Images::new(&IMAGE, &hit)));
     let pages = Table::check(&IMAGE).unwrap().page_count();
-    assert!(mend_page(&mut hit, &IMAGE, pages) && hit == *IMAGE);
+    assert!(Images::mend_page(&mut hit, &IMAGE, pages) && hit == *IMAGE);
     let mut bad = IMAGE.clone();
     bad[40] ^= 1;
-    assert!(!mend_page(&mut hit, &bad, pages) && !mend_page(&mut hit, &IMAGE, pages + 1));
+    assert!(!Images::mend_page(&mut hit, &bad, pages) && !Images::mend_page(&mut hit, &IMAGE, pages + 1));
     assert!(!reported(&Images::new(&hit, &TWIN)));
 }
 

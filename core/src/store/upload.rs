@@ -224,7 +224,7 @@ mod tests {
                     harmless += usize::from(image != whole);
                     let bounds = table.bounds();
                     assert!(bounds.slope < 1.0 && bounds.error_rad <= table.error_limit_rad());
-                    assert!(table.inverse_error_bound_rad() <= crate::MAX_INVERSE_ERROR_RAD);
+                    assert!(table.inverse_error_bound_rad() <= crate::Table::MAX_INVERSE_ERROR_RAD);
                     for _ in 0..10 {
                         let generator = crate::GeneratorAngle::from_counts((next(usize::MAX / 2) as i64) << 20);
                         let torque = next(200) as f32 - 100.0;

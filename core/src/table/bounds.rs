@@ -5,12 +5,12 @@ use crate::num::larger;
 
 /// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table
 /// misses of its samples.
-pub const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
+pub(crate) const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
 /// Most iterations of an inverse.
-pub const MAX_INVERSE_ITERATIONS: u8 = 8;
+pub(crate) const MAX_INVERSE_ITERATIONS: u8 = 8;
 
 /// No table is accepted whose inverse is left with more, rad at the output: 0.2″.
-pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
+pub(crate) const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
 
 /// Targets this close to the output leave the generator where it is: the rounding of forward and inverse, counts.
 pub(crate) const HOLD_COUNTS: i32 = 8;

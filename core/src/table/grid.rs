@@ -202,7 +202,7 @@ pub(crate) fn jump_at(i: usize, len: usize, node: impl Fn(usize) -> f32) -> bool
 }
 
 /// Whether bit `node` of [`jump_intervals`] is set.
-pub(crate) fn is_jump(jumps: u64, node: usize) -> bool {
+pub fn is_jump(jumps: u64, node: usize) -> bool {
     u32::try_from(node).ok().and_then(|bit| jumps.checked_shr(bit)).is_some_and(|bits| bits & 1 == 1)
 }
 

@@ -34,16 +34,16 @@ mod read;
 pub mod windup;
 mod words;
 
-pub use bounds::{Bounds, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS};
+pub use bounds::Bounds;
 pub use identity::{Identity, IdentityCheck};
 #[cfg(any(test, feature = "testing"))]
 pub use image::reseal;
 pub use image::{
-    FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
-    TableData, WriteError, image_bytes, write_image,
+    BYTE_ORDER_MARK, MAGIC, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES,
+    RESERVED, TEXT_BYTES, UNITS_PER_COUNT, cell_width, complete, counted, image_bytes, limit_counts, plan_of,
+    ripple_row,
 };
-pub(crate) use image::{ImageCheck, NODE_WORDS, page_intact, ripple_row, word};
-pub use image::{MAX_AXIS_VALUE, counted};
+pub(crate) use image::{ImageCheck, NODE_WORDS, page_intact, word};
 pub(crate) use memory::{Doubt, Memory, PointPlan};
 pub use model::{Approach, Command, Prediction};
 pub(crate) use model::{Estimate, TableModel, departure};
@@ -153,6 +153,17 @@ impl Memory for Table<'_> {
 }
 
 impl<'a> Table<'a> {
+    /// Format version written and read.
+    pub const FORMAT_VERSION: u16 = image::FORMAT_VERSION;
+    /// Bytes of one page, the unit of a scrub and of an upload.
+    pub const PAGE_BYTES: usize = PAGE_BYTES;
+    /// No table may give a larger error, rad (2.9°, one and a half tooth pitches of a 188-tooth drive).
+    pub const MAX_ERROR_RAD: f32 = MAX_ERROR_RAD;
+    /// Most iterations of an inverse.
+    pub const MAX_INVERSE_ITERATIONS: u8 = bounds::MAX_INVERSE_ITERATIONS;
+    /// No table is accepted whose inverse is left with more, rad at the output: 0.2″.
+    pub const MAX_INVERSE_ERROR_RAD: f32 = bounds::MAX_INVERSE_ERROR_RAD;
+
     /// The drive the table is for.
     #[must_use]
     pub const fn drive(&self) -> &Drive {

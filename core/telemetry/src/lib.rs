@@ -40,9 +40,6 @@
     )
 )]
 
-#[cfg(test)]
-extern crate std;
-
 #[cfg(feature = "defmt")]
 mod defmt;
 mod events;
@@ -54,3 +51,6 @@ pub use events::{Event, Events, Watch};
 #[doc(hidden)] // For the C interface.
 pub use records::is_due;
 pub use records::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
+
+#[cfg(test)]
+extern crate std;

@@ -99,7 +99,7 @@ fn dictionary() -> String {
     }
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <!-- A record of telemetry of the core. Made and checked by core/tests/telemetry_dictionary.rs. -->\n\
+         <!-- A record of telemetry of the core. Made and checked by core/telemetry/tests/dictionary.rs. -->\n\
          <SpaceSystem xmlns=\"http://www.omg.org/spec/XTCE/20180204\" name=\"flexspline\">\n  <TelemetryMetaData>\n\
          \x20   <ParameterTypeSet>\n{types}    </ParameterTypeSet>\n\
          \x20   <ParameterSet>\n{parameters}    </ParameterSet>\n\
@@ -110,7 +110,7 @@ fn dictionary() -> String {
 }
 
 fn page() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/telemetry.xtce.xml")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/telemetry.xtce.xml")
 }
 
 fn kept() -> String {

@@ -611,10 +611,10 @@ impl Core {
         self.last = Some((board, given));
         let OnBoardOutput { out, ahead, .. } = given;
         // Without a table as the ratio has it.
-        let [rate, acceleration] = if ahead.rate_rad_s.is_nan() {
+        let [rate, acceleration] = if ahead[0].is_nan() {
             [rate_rad_s, acceleration_rad_s2].map(|value| value * made.unit.nominal.ratio)
         } else {
-            [ahead.rate_rad_s, ahead.acceleration_rad_s2].map(f64::from)
+            ahead.map(f64::from)
         };
         Commanded {
             command: out.command,

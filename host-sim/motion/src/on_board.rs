@@ -3,8 +3,8 @@
 //! `no_std`: the firmware of `tests/firmware` is made of this file.
 
 use flexspline::{
-    Adjustment, Direction, Drive, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, MotionAhead, Output,
-    OutputAngle, Overrun, SettingError, Store, TorquePath, TorqueReading, TorqueSettings,
+    Adjustment, Direction, Drive, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Output, OutputAngle,
+    Overrun, SettingError, Store, TorquePath, TorqueReading, TorqueSettings,
 };
 
 /// Settings of a joint.
@@ -47,8 +47,8 @@ pub struct OnBoardOutput {
     pub out: Output,
     /// The torque that it was asked with, N·m.
     pub torque_n_m: f32,
-    /// For the servo.
-    pub ahead: MotionAhead,
+    /// Rate and acceleration for the servo, rad/s and rad/s².
+    pub ahead: [f32; 2],
 }
 
 /// A joint on board, tracking from the first tick on.
@@ -84,10 +84,11 @@ impl OnBoard {
     #[must_use]
     pub fn tick(&mut self, images: &Images<'_>, store: &mut Store, input: &OnBoardInput) -> OnBoardOutput {
         let torque_n_m = self.torque_n_m(input);
-        let mut ahead = self.joint.motion_ahead(store, input.target, input.motion, torque_n_m, self.ahead_s);
+        let [ahead_rate, mut ahead_acceleration] =
+            self.joint.motion_ahead(store, input.target, input.motion, torque_n_m, self.ahead_s);
         let [rate, acceleration] = input.motion;
         if !passes_slowly(self.joint.drive(), rate, self.tick_s) {
-            ahead.acceleration_rad_s2 = ahead.rate_rad_s / rate * acceleration;
+            ahead_acceleration = ahead_rate / rate * acceleration;
         }
         let input = Input {
             generator: Some(input.generator),
@@ -96,6 +97,7 @@ impl OnBoard {
             missed_ticks: 0,
             adjustment: Adjustment::default(),
         };
+        let ahead = [ahead_rate, ahead_acceleration];
         OnBoardOutput { out: self.joint.tick(images, store, &mut self.state, &input), torque_n_m, ahead }
     }
 
@@ -226,13 +228,13 @@ impl OnBoardInput {
 /// All bits of what a tick gives into a running hash (FNV-1a, by words).
 #[must_use]
 pub fn hashed(hash: u64, given: &OnBoardOutput) -> u64 {
-    let OnBoardOutput { out, torque_n_m, ahead } = given;
+    let OnBoardOutput { out, torque_n_m, ahead: [rate, acceleration] } = given;
     let words = [
         out.command.counts() as u64,
         out.output.counts() as u64,
         u64::from(out.correction_rad.to_bits()) << 32 | u64::from(out.held_back_rad.to_bits()),
         u64::from(out.uncertainty_rad.to_bits()) << 32 | u64::from(out.flags.bits()),
-        u64::from(ahead.rate_rad_s.to_bits()) << 32 | u64::from(ahead.acceleration_rad_s2.to_bits()),
+        u64::from(rate.to_bits()) << 32 | u64::from(acceleration.to_bits()),
         u64::from(torque_n_m.to_bits()),
     ];
     words.iter().fold(hash, |hash, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
@@ -248,7 +250,7 @@ pub const LINE_TICKS: usize = 500;
 /// # Errors
 /// Of what is written to.
 pub fn line(to: &mut impl core::fmt::Write, tick: usize, given: &OnBoardOutput, hash: u64) -> core::fmt::Result {
-    let MotionAhead { rate_rad_s, acceleration_rad_s2 } = given.ahead;
+    let [rate_rad_s, acceleration_rad_s2] = given.ahead;
     writeln!(
         to,
         "{tick} {} {:08x} {:08x} {:08x} {hash:016x}",

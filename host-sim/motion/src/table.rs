@@ -3,7 +3,8 @@
 
 use core::f64::consts::TAU;
 
-use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, MAX_ERROR_RAD, Provenance, Table};
+use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, Table};
+use flexspline_make::Provenance;
 use flexspline_make::{
     Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, ProjectError, Sample, Workspace, make_image,
 };
@@ -76,7 +77,7 @@ pub fn image(
         output: curve(&OUTPUT_ORDERS),
         missing_direction: MissingDirection::Refuse,
         negative_half_width_tolerance_rad: 1e-4,
-        deviation_limit_rad: f64::from(MAX_ERROR_RAD),
+        deviation_limit_rad: f64::from(Table::MAX_ERROR_RAD),
     };
     let samples = samples(gear, sampling, &torques);
     let mut numbers = vec![0.0; plan.numbers_len()];
@@ -94,7 +95,7 @@ pub fn image(
         solver_residual: 0.0,
         torque_range_n_m: [torques[0], torques[torques.len() - 1]],
         temperature_range_c: [temperatures[0]; 2],
-        error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(MAX_ERROR_RAD)) as f32,
+        error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(Table::MAX_ERROR_RAD)) as f32,
     };
     let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, id)?;
     image.truncate(fit.image_bytes);

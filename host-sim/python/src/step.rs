@@ -2,9 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use flexspline::{
-    Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, SAVED_STATE_BYTES, Table as CoreTable,
-};
+use flexspline::{Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, Table as CoreTable};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{dead_zone_n_m, generator_of};
 use flexspline_identify::replay::{MeasuredRow, RowsOf, parse as parse_measured, replay};
@@ -57,12 +55,13 @@ impl PlayState {
     /// A state that was saved.
     #[staticmethod]
     fn restore(saved: &[u8]) -> PyResult<PlayState> {
-        let bytes: Option<&[u8; SAVED_STATE_BYTES]> = saved.try_into().ok();
+        let bytes: Option<&[u8; CoreState::SAVED_BYTES]> = saved.try_into().ok();
         let state = bytes.and_then(CoreState::restore);
         let state = state.ok_or_else(|| {
             bad(format!(
-                "play state: found {} bytes that are no whole saved state, allowed: the {SAVED_STATE_BYTES} of save()",
-                saved.len()
+                "play state: found {} bytes that are no whole saved state, allowed: the {} of save()",
+                saved.len(),
+                CoreState::SAVED_BYTES
             ))
         })?;
         Ok(PlayState(Mutex::new(state)))

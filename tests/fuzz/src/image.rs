@@ -2,10 +2,7 @@
 
 use crate::Choices;
 use crate::tables::{BASES, Numbers, hostile_axis};
-use flexspline::{
-    Approach, Direction, GeneratorAngle, MAX_ERROR_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, OutputAngle,
-    PlayState, Quality, Table,
-};
+use flexspline::{Approach, Direction, GeneratorAngle, OutputAngle, PlayState, Quality, Table};
 use std::f32::consts::TAU;
 
 /// One count, rad.
@@ -132,9 +129,9 @@ pub fn keeps_its_promises(table: &Table<'_>, choices: &mut Choices<'_>) {
     let bounds = table.bounds();
     assert!(bounds.slope >= 0.0 && bounds.slope < 1.0 && bounds.curve_slope <= bounds.slope, "{bounds:?}");
     assert!(bounds.error_rad >= 0.0 && bounds.error_rad <= table.error_limit_rad(), "{bounds:?}");
-    assert!(table.error_limit_rad() <= MAX_ERROR_RAD);
-    assert!(table.inverse_error_bound_rad() >= 0.0 && table.inverse_error_bound_rad() <= MAX_INVERSE_ERROR_RAD);
-    assert!((1..=MAX_INVERSE_ITERATIONS).contains(&table.inverse_iterations()));
+    assert!(table.error_limit_rad() <= Table::MAX_ERROR_RAD);
+    assert!(table.inverse_error_bound_rad() >= 0.0 && table.inverse_error_bound_rad() <= Table::MAX_INVERSE_ERROR_RAD);
+    assert!((1..=Table::MAX_INVERSE_ITERATIONS).contains(&table.inverse_iterations()));
     let torque_nodes: Vec<f32> = table.torque_nodes_n_m().collect();
     let temperature_nodes: Vec<f32> = table.temperature_nodes_c().collect();
     // Rounding of the integers: a few counts for each part.
@@ -162,7 +159,7 @@ pub fn keeps_its_promises(table: &Table<'_>, choices: &mut Choices<'_>) {
         assert!(found.quality != Quality::InRange || (play.is_known() && found.uncertainty_rad == 0.0), "{found:?}");
         assert!(found.transmission_error_rad.abs() <= most, "{found:?}, at most {most}");
         let uncertainty = found.uncertainty_rad;
-        assert!((0.0..=MAX_ERROR_RAD * 4.2).contains(&uncertainty), "{found:?}");
+        assert!((0.0..=Table::MAX_ERROR_RAD * 4.2).contains(&uncertainty), "{found:?}");
         let near = play;
         let target = found.output.offset_rad((choices.part() * 1e-3) as f32);
         let command = table.inverse(target, torque, temperature, Approach::From(&near));

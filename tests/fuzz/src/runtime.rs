@@ -4,8 +4,8 @@ use crate::Choices;
 use crate::image::COUNT_RAD;
 use crate::tables::{flying, hostile_axis};
 use flexspline::{
-    Adjustment, Drive, GeneratorAngle, Images, Input, Joint, JointState, Limits, MAX_ERROR_RAD, Mode, Output,
-    OutputAngle, Overrun, Quality, SettingError, Store, Table,
+    Adjustment, Drive, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Output, OutputAngle, Overrun,
+    Quality, SettingError, Store, Table,
 };
 
 /// Parts of a count in which the correction is kept.
@@ -69,17 +69,20 @@ impl Watch {
     /// gives.
     pub fn stops_in_time(&self, correction_rad: f64, speed_rad: f64) -> bool {
         let speed = speed_rad.abs().min(self.rate);
-        correction_rad.abs() + speed + speed * speed / (2.0 * self.acceleration) <= f64::from(MAX_ERROR_RAD)
+        correction_rad.abs() + speed + speed * speed / (2.0 * self.acceleration) <= f64::from(Table::MAX_ERROR_RAD)
     }
 
     /// One tick's output.
     pub fn see(&mut self, input: &Input, drive: &Drive, out: &Output) {
         let now = f64::from(out.correction_rad);
-        assert!(now.abs() <= 1.005 * f64::from(MAX_ERROR_RAD), "{out:?}");
-        assert!(out.held_back_rad.is_finite() && out.transmission_error_rad.abs() <= 1.002 * MAX_ERROR_RAD, "{out:?}");
+        assert!(now.abs() <= 1.005 * f64::from(Table::MAX_ERROR_RAD), "{out:?}");
+        assert!(
+            out.held_back_rad.is_finite() && out.transmission_error_rad.abs() <= 1.002 * Table::MAX_ERROR_RAD,
+            "{out:?}"
+        );
         assert!(out.uncertainty_rad >= 0.0 && out.uncertainty_rad.is_finite(), "{out:?}");
         // Single precision of the output, and the parts in which it is kept.
-        let rounding = 4.0 * FINE_RAD + 1.2e-7 * f64::from(MAX_ERROR_RAD);
+        let rounding = 4.0 * FINE_RAD + 1.2e-7 * f64::from(Table::MAX_ERROR_RAD);
         let [last, before] = self.last;
         if let Some(last) = last {
             let step = (now - last).abs();

@@ -4,9 +4,7 @@ use crate::Choices;
 use crate::image::COUNT_RAD;
 use crate::runtime::{any_input, any_joint};
 use crate::tables::flying;
-use flexspline::{
-    GeneratorAngle, Images, JointState, Mode, PlayState, SAVED_JOINT_BYTES, SAVED_STATE_BYTES, Store, Table,
-};
+use flexspline::{GeneratorAngle, Images, JointState, Mode, PlayState, Store, Table};
 
 /// Where a saved joint has its correction.
 const CORRECTION: usize = 56;
@@ -32,7 +30,7 @@ pub fn run(data: &[u8]) {
     let mut play_bytes = PlayState::unknown().save();
     let sealed = choices.any();
     for _ in 0..choices.below(12) {
-        let at = choices.below(SAVED_JOINT_BYTES);
+        let at = choices.below(JointState::SAVED_BYTES);
         match choices.below(3) {
             0 => bytes[at] ^= 1 << choices.below(8),
             1 => bytes[at] = choices.any(),
@@ -40,7 +38,7 @@ pub fn run(data: &[u8]) {
         }
     }
     for _ in 0..choices.below(8) {
-        play_bytes[choices.below(SAVED_STATE_BYTES)] = choices.any();
+        play_bytes[choices.below(PlayState::SAVED_BYTES)] = choices.any();
     }
     if sealed {
         seal(&mut play_bytes);
@@ -51,7 +49,7 @@ pub fn run(data: &[u8]) {
         assert!(play.uncertainty_rad() >= 0.0);
         let error = play.output().map_or(0.0, |output| output.minus_rad(play.nominal().expect("it has an output")));
         assert!(
-            error.abs() <= 1.005 * flexspline::MAX_ERROR_RAD + 2.0 * flexspline::Adjustment::MAX_RAD + 0.2,
+            error.abs() <= 1.005 * flexspline::Table::MAX_ERROR_RAD + 2.0 * flexspline::Adjustment::MAX_RAD + 0.2,
             "{play:?}"
         );
     }

@@ -4,8 +4,7 @@ use crate::Choices;
 use crate::runtime::any_input;
 use crate::tables::{BASES, flying};
 use flexspline::{
-    Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Output, Overrun, PAGE_BYTES, Quality, Store,
-    Table, mend_page,
+    Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Output, Overrun, Quality, Store, Table,
 };
 
 /// Object that flips.
@@ -49,7 +48,7 @@ pub fn run(data: &[u8]) {
     // A page and its checksum are one: that of the whole is the page after the last.
     let last = table.page_count();
     let body: usize = (0..last).filter_map(|page| table.page(page)).map(<[u8]>::len).sum();
-    let page_of = |at: usize| if at < body { at / PAGE_BYTES } else { (at - body) / 4 };
+    let page_of = |at: usize| if at < body { at / Table::PAGE_BYTES } else { (at - body) / 4 };
     let mut owner = vec![None; last + 1];
     for _ in 0..400 {
         if choices.is_empty() {
@@ -104,7 +103,7 @@ pub fn run(data: &[u8]) {
         hit.check_images(&seen, choices.below(600));
         if let Some((image, page)) = hit.damaged_page().filter(|_| choices.below(4) == 0) {
             let good = images[1 - image].clone();
-            if mend_page(&mut images[image], &good, page) {
+            if Images::mend_page(&mut images[image], &good, page) {
                 hit.mended(image, page);
             }
             if let (Flips::OtherPages, Some(owner)) = (flips, owner.get_mut(page)) {

@@ -1,7 +1,8 @@
 //! Tables to start from: of fixed numbers, and of any numbers that the writer takes.
 
 use crate::Choices;
-use flexspline::{Drive, FixedMember, GeneratorKind, Provenance, TableData, WriteError, image_bytes, write_image};
+use flexspline::{Drive, FixedMember, GeneratorKind};
+use flexspline_make::{Provenance, TableData, WriteError, image_bytes, write_image};
 use std::sync::LazyLock;
 
 /// Numbers of a table, owned.

@@ -158,8 +158,8 @@ fn what_lies_ahead_is_what_rust_says() {
     assert_eq!(predict(&now, &mut ahead), FlexsplineStatus::Ok);
     let off = Disturbance { torque_n_m: 0.5, load_change_n_m: 0.05, ..Disturbance::default() };
     let turned = rust.ahead(&state, 12.0, 10, now.state_bound, &off);
-    let joint: &Joint = get(&o.joint, JOINT_MARK).unwrap();
-    let store: &Store = get(&*o.store, STORE_MARK).unwrap();
+    let joint: &Joint = get(&o.joint, Object::Joint).unwrap();
+    let store: &Store = get(&*o.store, Object::Store).unwrap();
     let from = Now {
         generator: GeneratorAngle::from_counts(1 << 30),
         play: &PlayState::unknown(),

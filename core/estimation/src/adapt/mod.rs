@@ -8,9 +8,9 @@
 //! half-width beside the table's with `s` = ±1 the side of the play in contact, and `a`, `b` the cosine and sine of a
 //! few orders of the generator angle. Which of them are estimated is a list of [`Term`]s; their number is a type.
 //!
-//! [`OnlineCalibration::update`] is called once each tick after [`Joint::tick`](flexspline::Joint::tick), with a measurement if there
-//! is one: an encoder at the output each tick, or a star or beacon now and then. What it returns is added in the next
-//! tick.
+//! [`OnlineCalibration::update`] is called once each tick after [`Joint::tick`](flexspline::Joint::tick), with a
+//! measurement if there is one: an encoder at the output each tick, or a star or beacon now and then. What it returns
+//! is added in the next tick.
 //!
 //! # How
 //! A Kalman filter for coefficients that wander, in the form `P = U·D·Uᵀ` (Bierman, *Factorization Methods for Discrete
@@ -83,8 +83,9 @@ pub struct Seen<'s> {
 /// Addition to the table in the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted {
-    /// For [`Input`](flexspline::Input) of the next tick. Where learning is lost it adds nothing, with all that coefficients
-    /// can have added as its uncertainty, until [`AdaptState::set_learning`] is called or the adapter is made anew.
+    /// For [`Input`](flexspline::Input) of the next tick. Where learning is lost it adds nothing, with all that
+    /// coefficients can have added as its uncertainty, until [`AdaptState::set_learning`] is called or the adapter is
+    /// made anew.
     pub adjustment: Adjustment,
     /// Standard deviation of what it adds to the error, rad: no bound, so the adjustment does not have it. Where
     /// learning is lost that of the adjustment.

@@ -3,7 +3,7 @@
 use crate::drive::Drive;
 use crate::error::{Field, ImageError};
 use crate::num;
-use crate::table::grid::{MAX_CLAMPED_NODES, MIN_PERIODIC_NODES};
+use crate::table::grid::MIN_PERIODIC_NODES;
 
 /// Format version written and read.
 pub const FORMAT_VERSION: u16 = 3;
@@ -19,17 +19,18 @@ pub const MAX_ERROR_RAD: f32 = 0.05;
 /// Bytes of the tool version and of the mesh level.
 pub const TEXT_BYTES: usize = 24;
 
-pub(super) const MAGIC: [u8; 8] = *b"\x89FXT\r\n\x1a\n";
-pub(super) const BYTE_ORDER_MARK: u16 = 0xfeff;
+/// First bytes of an image.
+pub const MAGIC: [u8; 8] = *b"\x89FXT\r\n\x1a\n";
+/// After the version: bytes in another order are found by it.
+pub const BYTE_ORDER_MARK: u16 = 0xfeff;
 pub(super) const HEADER_BYTES: usize = 256;
-/// Slots of the torque axis and of the temperature axis.
-pub(super) const AXIS_SLOTS: [usize; 2] = [MAX_CLAMPED_NODES, MAX_TEMPERATURE_NODES];
 /// Ripple units in a count: 2¹⁹.
-pub(super) const UNITS_PER_COUNT: f64 = 524_288.0;
+pub const UNITS_PER_COUNT: f64 = 524_288.0;
 
 pub(super) const CRC_BYTES: usize = 4;
 pub(crate) const ID_OFFSET: usize = 48;
-pub(super) const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
+/// Bytes that are zero.
+pub const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
 pub const MAX_AXIS_VALUE: f32 = 1e6;
 
@@ -68,7 +69,7 @@ const fn stored(nodes: usize) -> usize {
 }
 
 /// Values of the ripple of one direction in a record; also the words of a record.
-pub(crate) const fn ripple_row(nodes: usize) -> usize {
+pub const fn ripple_row(nodes: usize) -> usize {
     if nodes == 0 { 0 } else { nodes.saturating_add(5) & !1 }
 }
 
@@ -115,11 +116,19 @@ impl ImageLayout {
     }
 }
 
+/// The words of an image behind the cell width that follow from the node counts, and how many words
+/// its body has.
+#[must_use]
+pub fn plan_of(torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> ([u32; 7], u32) {
+    let layout = ImageLayout::new(torque, temperature, ripple, curves);
+    (layout.plan(torque, temperature, ripple, curves), layout.end as u32)
+}
+
 #[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(ImageLayout { curves, nodes, node_plane, records, record, end });
 
 /// Width of a cell of the ripple at the output, counts.
-pub(super) fn cell_width(drive: &Drive, ripple_nodes: usize) -> f32 {
+pub fn cell_width(drive: &Drive, ripple_nodes: usize) -> f32 {
     if ripple_nodes == 0 {
         return 1.0;
     }
@@ -131,7 +140,7 @@ pub(super) const DERIVED_WORDS: [usize; 2] = [word::CELL_WIDTH.saturating_add(8)
 
 /// An error limit in counts, rounded up; the per mille takes up the rounding of single precision, the counts that of
 /// integers.
-pub(super) fn limit_counts(limit_rad: f32) -> u32 {
+pub fn limit_counts(limit_rad: f32) -> u32 {
     (num::counts(limit_rad as f64) * 1.001 + 16.0) as u32
 }
 

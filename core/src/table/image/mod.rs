@@ -62,17 +62,16 @@ mod layout;
 mod sums;
 #[cfg(test)]
 mod tests;
-mod write;
 
 pub(crate) use check::ImageCheck;
 pub(crate) use header::Laid;
-pub(crate) use layout::ID_OFFSET;
 pub use layout::{
-    FORMAT_VERSION, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, TEXT_BYTES,
-    counted, image_bytes,
+    BYTE_ORDER_MARK, FORMAT_VERSION, MAGIC, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
+    PAGE_BYTES, RESERVED, TEXT_BYTES, UNITS_PER_COUNT, cell_width, counted, image_bytes, limit_counts, plan_of,
+    ripple_row,
 };
-pub(crate) use layout::{NODE_WORDS, ripple_row, word};
+pub(crate) use layout::{ID_OFFSET, NODE_WORDS, word};
+pub use sums::complete;
 pub(crate) use sums::page_intact;
 #[cfg(any(test, feature = "testing"))]
-pub use write::reseal;
-pub use write::{Provenance, TableData, WriteError, write_image};
+pub use sums::reseal;

@@ -1,7 +1,9 @@
 //! The checksums of an image: one of each page, one of all.
 
-use super::layout::{CRC_BYTES, PAGE_BYTES};
+use super::layout::{CRC_BYTES, DERIVED_WORDS, ID_OFFSET, PAGE_BYTES};
 use crate::crc::crc32;
+use crate::error::ImageError;
+use crate::table::Table;
 
 /// Computes and stores every checksum of an image whose body is complete.
 pub(super) fn seal(image: &mut [u8], body_bytes: usize) {
@@ -14,6 +16,43 @@ pub(super) fn seal(image: &mut [u8], body_bytes: usize) {
     }
     if let Some((before, last)) = image.split_last_chunk_mut::<CRC_BYTES>() {
         *last = crc32(before).to_le_bytes();
+    }
+}
+
+/// Stores what follows from the bounds of the numbers.
+pub(super) fn derive(image: &mut [u8], body_bytes: usize) -> Result<(), ImageError> {
+    seal(image, body_bytes);
+    let derived = Table::found(image)?.derived();
+    for (word, value) in DERIVED_WORDS.into_iter().zip(derived) {
+        let place = image.as_chunks_mut::<4>().0.get_mut(word);
+        place.into_iter().for_each(|bytes| *bytes = value.to_le_bytes());
+    }
+    Ok(())
+}
+
+/// Completes an image whose body is written: what follows from its numbers, the id, which is found from the body with
+/// the id zero, and every checksum.
+///
+/// # Errors
+/// [`ImageError`] of the first number that no table has.
+pub fn complete(image: &mut [u8], body_bytes: usize, id: impl FnOnce(&[u8]) -> [u8; 8]) -> Result<(), ImageError> {
+    derive(image, body_bytes)?;
+    let id = id(image.get(..body_bytes).unwrap_or_default());
+    if let Some(place) = image.get_mut(ID_OFFSET..).and_then(|rest| rest.first_chunk_mut::<8>()) {
+        *place = id;
+    }
+    seal(image, body_bytes);
+    Ok(())
+}
+
+/// Makes every checksum of an image right that states its body, whatever is in it.
+#[cfg(any(test, feature = "testing"))]
+pub fn reseal(image: &mut [u8]) {
+    let body_bytes = crate::table::word_at(image.as_chunks::<4>().0, super::word::BODY) as usize;
+    let body_bytes = body_bytes.saturating_mul(4);
+    if body_bytes < image.len() {
+        let _ = derive(image, body_bytes);
+        seal(image, body_bytes);
     }
 }
 

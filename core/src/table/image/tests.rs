@@ -1,6 +1,5 @@
 use super::layout::{HEADER_BYTES, ID_OFFSET};
-use super::sums::{page_intact, seal};
-use super::write::{complete, quantise};
+use super::sums::{derive, page_intact, seal};
 use super::*;
 use crate::angle::RAD_PER_COUNT;
 use crate::crc::crc32;
@@ -9,6 +8,7 @@ use crate::error::{DriveError, Field, ImageError};
 use crate::fixture;
 use crate::table::read::play_at;
 use crate::table::{GeneratorKind, Table, TableId};
+use crate::write::{Provenance, TableData, WriteError, quantise, write_image};
 use proptest::prelude::*;
 use std::vec;
 use std::vec::Vec;
@@ -576,7 +576,7 @@ proptest! {
         for (record, mantissa, decade) in slopes {
             put(NODES + NODE_BYTES * record + 4, mantissa * 1.0e6 * 10.0f32.powi(-decade))(&mut image);
         }
-        let _ = complete(&mut image, body_bytes);
+        let _ = derive(&mut image, body_bytes);
         seal(&mut image, body_bytes);
         if let Ok(table) = Table::check(&image) {
             for torque in [torque, 0.3 * torque, 0.05 * torque] {
@@ -599,7 +599,7 @@ proptest! {
             image[offset.min(body_bytes - 1)] = value;
         }
         seal(&mut image, body_bytes);
-        let _ = complete(&mut image, body_bytes);
+        let _ = derive(&mut image, body_bytes);
         seal(&mut image, body_bytes);
         if let Ok(table) = Table::check(&image) {
             let generator = crate::GeneratorAngle::from_counts(generator);

@@ -11,8 +11,8 @@
 //! softer unit winds up `1 / (1 - s)` times as far, so that the table may be off by `s / (1 - s)` of its wind-up.
 //!
 //! The loss is the width of the loop at no load after the largest torque either way. What the clearance of the FEM does
-//! not have of it becomes springs that slip with the torque (Iwan 1966; `MaxwellSlip` of flexspline-estimation), which take back part
-//! of the wind-up after each reversal.
+//! not have of it becomes springs that slip with the torque (Iwan 1966; `MaxwellSlip` of flexspline-estimation), which
+//! take back part of the wind-up after each reversal.
 
 use flexspline::Table;
 use serde::{Deserialize, Serialize};

@@ -3,8 +3,9 @@
 //! The projection itself is the core's ([`flexspline_make`]), the same code on the host and on board. Here its plan is
 //! laid: which nodes, which harmonics the samples can distinguish, and where the table came from.
 
-use flexspline::{FixedMember, MAX_RIPPLE_NODES, Provenance, Table};
+use flexspline::{FixedMember, Table};
 use flexspline_make::{Harmonics, MissingDirection, Plan, ProjectError, Sample, Workspace, make_image};
+use flexspline_make::{MAX_RIPPLE_NODES, Provenance};
 use thiserror::Error;
 
 use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
@@ -154,7 +155,7 @@ pub(super) fn trial_table(
     let core_plan = Plan {
         torque_nodes_n_m: &torque_nodes,
         temperature_nodes_c: &plan.temperature_nodes_c[..1],
-        deviation_limit_rad: f64::from(flexspline::MAX_ERROR_RAD),
+        deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         ..fem_plan(drive, plan)?
     };
     let source = Source::File { name: String::new(), blake3: String::new() };
@@ -267,7 +268,7 @@ fn make(
             [one] if mesh == SAMPLES => [one - ONE_TEMPERATURE_K, one + ONE_TEMPERATURE_K],
             nodes => span(nodes),
         },
-        error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(flexspline::MAX_ERROR_RAD)) as f32,
+        error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(flexspline::Table::MAX_ERROR_RAD)) as f32,
     };
     let id = |contents: &[u8]| {
         let mut id = [0; 8];

@@ -5,8 +5,9 @@
 //! (of the square roots), and where the table made so far misses it, the middle becomes a node. The same core code
 //! reads the trial table as will read the final one.
 
-use flexspline::{Direction, GeneratorAngle, ImageError, Table, WriteError};
+use flexspline::{Direction, GeneratorAngle, ImageError, Table};
 use flexspline_make::ProjectError;
+use flexspline_make::WriteError;
 
 use super::project::{TableError, trial_table};
 use rayon::prelude::*;

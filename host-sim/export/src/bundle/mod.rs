@@ -12,7 +12,7 @@ mod vectors;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use flexspline::FORMAT_VERSION;
+use flexspline::Table;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -287,7 +287,7 @@ impl Bundle {
         Manifest {
             bundle: "flexspline".to_owned(),
             version: VERSION.to_owned(),
-            table_format: FORMAT_VERSION,
+            table_format: Table::FORMAT_VERSION,
             tables: self.tables.iter().map(table).collect(),
             targets: self.libraries.iter().map(|library| library.target.clone()).collect(),
             files: files.iter().map(file).collect(),

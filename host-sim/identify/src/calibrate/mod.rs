@@ -24,8 +24,9 @@ mod table;
 mod together;
 mod zero;
 
-use flexspline::{ImageError, Table, WriteError};
+use flexspline::{ImageError, Table};
 use flexspline_make::ProjectError;
+use flexspline_make::WriteError;
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use flexspline::grid::{MAX_CLAMPED_NODES, jump_intervals};
 use flexspline::{Direction, GeneratorAngle, Table};
+use flexspline_make::grid::{MAX_CLAMPED_NODES, jump_intervals};
 use flexspline_make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 
 use super::parts::{GENERATOR_ORDERS, OUTPUT_ORDERS, PartName, State, TOOTH_ORDERS};
@@ -62,7 +62,7 @@ pub(super) fn make(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Res
             output: curve(from_table || has(PartName::OutputAngle), &ORDERS[..usize::from(OUTPUT_ORDERS)]),
             missing_direction: MissingDirection::Refuse,
             negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
-            deviation_limit_rad: f64::from(flexspline::MAX_ERROR_RAD),
+            deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         };
         let samples = samples(prior, model, recorded.scales.teeth, torques, &temperatures);
         let source = Source::File {

@@ -194,7 +194,7 @@ impl ExtendedTables<'_> {
             output: curve(&OUTPUT_ORDERS),
             missing_direction: MissingDirection::Refuse,
             negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
-            deviation_limit_rad: f64::from(flexspline::MAX_ERROR_RAD),
+            deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         };
         let source =
             Source::File { name: of.to_owned(), blake3: blake3::Hash::from(self.subject.hash).to_hex().to_string() };

@@ -1,22 +1,14 @@
 //! Writing an image: numbers become counts and units, and what is written is checked as a reader does.
 
-#[cfg(any(test, feature = "testing"))]
-use super::layout::word;
-use super::layout::{
-    AXIS_SLOTS, BYTE_ORDER_MARK, DERIVED_WORDS, FORMAT_VERSION, ID_OFFSET, ImageLayout, MAGIC, MAX_RIPPLE_NODES,
-    MAX_TEMPERATURE_NODES, RESERVED, TEXT_BYTES, UNITS_PER_COUNT, cell_width, counted, image_bytes, limit_counts,
-    ripple_row,
-};
-use super::sums::seal;
-use crate::drive::{Drive, FixedMember};
-use crate::error::{Field, ImageError};
-use crate::num::{self, larger64};
-use crate::table::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
-use crate::table::windup::Slopes;
-#[cfg(any(test, feature = "testing"))]
-use crate::table::word_at;
-use crate::table::{GeneratorKind, Table};
+use crate::slopes::Slopes;
 use core::fmt;
+use flexspline::shared::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
+use flexspline::shared::image::{
+    BYTE_ORDER_MARK, MAGIC, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, RESERVED, TEXT_BYTES, UNITS_PER_COUNT, cell_width,
+    complete, counted, image_bytes, limit_counts, plan_of, ripple_row,
+};
+use flexspline::shared::num;
+use flexspline::{Drive, Field, FixedMember, GeneratorKind, ImageError, Table};
 
 /// Origin of a table and its range of validity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +27,7 @@ pub struct Provenance<'a> {
     pub torque_range_n_m: [f32; 2],
     /// Temperatures the table holds for, °C; inside the temperature nodes unless there is only one.
     pub temperature_range_c: [f32; 2],
-    /// Largest |error| the table may give, rad, above 0 and at most [`MAX_ERROR_RAD`](crate::MAX_ERROR_RAD).
+    /// Largest |error| the table may give, rad, above 0 and at most [`Table::MAX_ERROR_RAD`].
     pub error_limit_rad: f32,
 }
 
@@ -51,7 +43,7 @@ pub struct TableData<'a> {
     pub temperature_nodes_c: &'a [f32],
     /// Nodes over one tooth pitch; 0 for no ripple.
     pub ripple_nodes: usize,
-    /// D, `[temperature][torque]`; its slopes follow from it (`flexspline-make`).
+    /// D, `[temperature][torque]`; its slopes follow from it ([`crate::project`]).
     pub mean_rad: &'a [f32],
     /// H, `[temperature][torque]`, ≥ 0.
     pub half_width_rad: &'a [f32],
@@ -153,7 +145,7 @@ impl<'o> ImageWriter<'o> {
 }
 
 /// The one place where numbers become integers: to nearest.
-pub(super) fn quantise(value: f64) -> i32 {
+pub(crate) fn quantise(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
@@ -194,7 +186,7 @@ impl TableData<'_> {
     /// The unit in which the largest ripple of either direction is 32767, rounded up.
     fn ripple_unit(&self) -> u32 {
         let pairs = self.mean_ripple_rad.iter().zip(self.half_width_ripple_rad);
-        let largest = pairs.fold(0.0f64, |most, (r, h)| larger64(most, (*r as f64).abs() + (*h as f64).abs()));
+        let largest = pairs.fold(0.0f64, |most, (r, h)| most.max((*r as f64).abs() + (*h as f64).abs()));
         let unit = num::counts(largest) / i16::MAX as f64 * UNITS_PER_COUNT;
         let whole = unit as u32;
         if unit > whole as f64 { whole.saturating_add(1) } else { whole }
@@ -266,11 +258,11 @@ pub fn write_image(
     let ripple_unit = data.ripple_unit();
     let nodes = (data.torque_nodes_n_m.len(), data.temperature_nodes_c.len(), data.ripple_nodes);
     let curve_nodes = curves.map(<[f32]>::len);
-    let layout = ImageLayout::new(nodes.0, nodes.1, nodes.2, curve_nodes);
+    let (plan, body_words) = plan_of(nodes.0, nodes.1, nodes.2, curve_nodes);
 
     let mut writer = ImageWriter { rest: image, needed: 0 };
     writer.put(&MAGIC);
-    writer.put(&FORMAT_VERSION.to_le_bytes());
+    writer.put(&Table::FORMAT_VERSION.to_le_bytes());
     writer.put(&BYTE_ORDER_MARK.to_le_bytes());
     writer.put(&(needed as u32).to_le_bytes());
     writer.put(&provenance.drive_hash);
@@ -291,12 +283,14 @@ pub fn write_image(
     writer.put_numbers(&provenance.torque_range_n_m);
     writer.put_numbers(&provenance.temperature_range_c);
     writer.put_numbers(&[provenance.error_limit_rad, cell_width(&data.drive, nodes.2)]);
-    layout.plan(nodes.0, nodes.1, nodes.2, curve_nodes).iter().for_each(|word| writer.put(&word.to_le_bytes()));
+    plan.iter().for_each(|word| writer.put(&word.to_le_bytes()));
     // The inverse follows from the bounds, which are found in the finished image.
     writer.put(&[0; 8]);
-    writer.put(&(layout.end as u32).to_le_bytes());
+    writer.put(&body_words.to_le_bytes());
     writer.put(&[0; RESERVED.end - RESERVED.start]);
-    for (axis, slots) in [data.torque_nodes_n_m, data.temperature_nodes_c].into_iter().zip(AXIS_SLOTS) {
+    for (axis, slots) in
+        [data.torque_nodes_n_m, data.temperature_nodes_c].into_iter().zip([MAX_CLAMPED_NODES, MAX_TEMPERATURE_NODES])
+    {
         writer.put_numbers(axis);
         (axis.len()..slots).for_each(|_| writer.put_numbers(&[f32::MAX]));
     }
@@ -312,36 +306,7 @@ pub fn write_image(
     data.put_records(&mut writer, ripple_unit);
 
     let body_bytes = writer.needed;
-    complete(image, body_bytes)?;
-    let id = id(image.get(..body_bytes).unwrap_or_default());
-    if let Some(place) = image.get_mut(ID_OFFSET..).and_then(|rest| rest.first_chunk_mut::<8>()) {
-        *place = id;
-    }
-    seal(image, body_bytes);
+    complete(image, body_bytes, id)?;
     Table::check(image)?;
     Ok(needed)
-}
-
-/// Stores what follows from the bounds of the numbers.
-pub(super) fn complete(image: &mut [u8], body_bytes: usize) -> Result<(), ImageError> {
-    seal(image, body_bytes);
-    let derived = Table::found(image)?.derived();
-    for (word, value) in DERIVED_WORDS.into_iter().zip(derived) {
-        let place = image.as_chunks_mut::<4>().0.get_mut(word);
-        place.into_iter().for_each(|bytes| *bytes = value.to_le_bytes());
-    }
-    Ok(())
-}
-
-/// Makes every checksum of an image right that states its body, whatever is in it.
-#[cfg(any(test, feature = "testing"))]
-#[doc(hidden)]
-pub fn reseal(image: &mut [u8]) {
-    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize;
-    let body_bytes = body_bytes.saturating_mul(4);
-    if body_bytes < image.len() {
-        seal(image, body_bytes);
-        let _ = complete(image, body_bytes);
-        seal(image, body_bytes);
-    }
 }
