@@ -98,14 +98,12 @@ impl<'b> Upload<'b> {
 
     /// Goes on with an upload of which so much has come: for C, where no pointer is kept between calls.
     #[doc(hidden)]
-    #[must_use]
     pub fn resume(buffer: &'b mut [u8], announced: usize, received: usize) -> Result<Self, UploadError> {
         Self::begin(buffer, announced).map(|begun| Self { received, ..begun })
     }
 
     /// [`Self::finish`] of an upload of which so much has come.
     #[doc(hidden)]
-    #[must_use]
     pub fn check(buffer: &'b [u8], announced: usize, received: usize) -> Result<Table<'b>, UploadError> {
         let found = buffer.len();
         let image = buffer.get(..announced).ok_or(UploadError::Buffer { announced, found })?;

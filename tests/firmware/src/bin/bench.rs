@@ -7,9 +7,10 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
+use flexspline::parts::{self, OperatingPoint};
 use flexspline::{
     Activation, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint, JointState, Mode,
-    OperatingPoint, Output, OutputAngle, PlayState, Prediction, Progress, Store, parts, self_test,
+    Output, OutputAngle, PlayState, Prediction, Progress, Store, self_test,
 };
 use flexspline_estimation::{Measured, PredictorState, TwoMassObserver};
 use flexspline_firmware::count::{Counter, Range};
