@@ -376,11 +376,13 @@ impl<S: Sink> Recorder<S> {
     }
 
     /// One tick, after [`Joint::tick`](flexspline::Joint::tick): recorded if it is due. True if a record was lost.
+    #[inline]
     pub fn record(&mut self, tick: u32, state: &JointState, store: &Store, output: &Output) -> bool {
         is_due(tick, self.every.get(), 0) && self.record_now(tick, state, store, output)
     }
 
     /// Records a tick whether due or not: something happened.
+    #[inline]
     pub fn record_now(&mut self, tick: u32, state: &JointState, store: &Store, output: &Output) -> bool {
         let record = Record { number: self.number, lost: self.lost as u16, ..Record::of(tick, state, store, output) };
         self.number = self.number.wrapping_add(1);
