@@ -9,7 +9,7 @@ mod fprime;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
-use flexspline::grid::MAX_PERIODIC_NODES;
+use flexspline::shared::grid::MAX_PERIODIC_NODES;
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 use thiserror::Error;
