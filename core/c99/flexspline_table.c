@@ -669,9 +669,10 @@ static bool solve(const fxt_table *table, const point *at, int64_t target, bool 
 typedef struct {
     int64_t nominal;
     int32_t error, lower, upper, half;
+    int32_t without[2]; /* the bounds as they would be if no flank had taken the output along in the last update; not kept */
 } play_state;
 
-static const play_state unknown_state = {0, 0, INT32_MIN, INT32_MAX, -1};
+static const play_state unknown_state = {0, 0, INT32_MIN, INT32_MAX, -1, {0, 0}};
 
 /* Each number of a fxt_play is kept beside that of an unknown side, so that memory of zeros is one: a known play may be all zero here. */
 static inline play_state state_of(const fxt_play *play)
@@ -721,12 +722,23 @@ static int32_t play_update(play_state *play, int64_t nominal, int32_t centre, in
     centre = sane ? centre : last_centre;
     const int64_t went = (int64_t)minus_near(nominal, play->nominal) + sub(centre, last_centre);
     const int32_t moved = started ? saturate(went) : 0;
-    play->lower = clamped(saturate((int64_t)play->lower - moved), half);
-    play->upper = clamped(saturate((int64_t)play->upper - moved), half);
+    play->without[0] = saturate((int64_t)play->lower - moved);
+    play->without[1] = saturate((int64_t)play->upper - moved);
+    play->lower = clamped(play->without[0], half);
+    play->upper = clamped(play->without[1], half);
     play->nominal = nominal;
     play->half = half;
     play->error = add(centre, play_offset(play));
     return play->error;
+}
+
+/* The last update was none: the output is where it was before it. The centre stays. */
+static void play_take_back(play_state *play, const int32_t without[2])
+{
+    const int32_t offset = play_offset(play);
+    play->lower = without[0];
+    play->upper = without[1];
+    play->error = add(play->error, sub(play_offset(play), offset));
 }
 
 /* What the output does now, counts. */
@@ -1547,7 +1559,7 @@ fxt_play fxt_play_unknown(void)
 fxt_play fxt_play_after(fxt_direction direction)
 {
     const int32_t side = i32(direction == FXT_FORWARD ? 0x80000000u : 0x7fffffffu);
-    const play_state is = {0, 0, side, side, -1};
+    const play_state is = {0, 0, side, side, -1, {0, 0}};
     return kept(&is);
 }
 
@@ -1608,7 +1620,7 @@ bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
     }
     const uint64_t nominal = (uint64_t)word_from(saved + 4) << 32 | word_from(saved);
     const play_state found = {(int64_t)nominal, i32(word_from(saved + 8)), i32(word_from(saved + 12)), i32(word_from(saved + 16)),
-                              i32(word_from(saved + 20))};
+                              i32(word_from(saved + 20)), {0, 0}};
     const uint32_t size = found.error < 0 ? 0u - (uint32_t)found.error : (uint32_t)found.error;
     const bool started =
         found.half >= 0 && found.half <= MOST_PLAY && found.lower >= -found.half && found.upper <= found.half;
@@ -1697,6 +1709,12 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
 #define FLANK_FORWARD 1u
 #define FLANK_BACKWARD 2u
 
+/* Samples in a row that were believed: with the second there is a way in a tick, with the third a change of it. */
+#define HAS_STEP 2u
+#define HAS_BEND 3u
+/* Without a given acceleration a sample that is out and back is taken back where it needs full speed in less than 2^6 ticks. */
+#define SPIKE_SHIFT 6u
+
 static inline uint32_t to_count(float value)
 {
     const int32_t whole = to_i32(value);
@@ -1750,6 +1768,9 @@ fxt_limit fxt_joint_init(fxt_joint *joint, const fxt_limits *limits)
     joint->rate = to_i32(fast);
     joint->acceleration = quick < (float)MOST_CHANGE ? to_i32(quick) : MOST_CHANGE;
     joint->largest_move = to_i32((float)move);
+    joint->largest_bend = joint->largest_move;
+    joint->spike = shifted(joint->largest_move, SPIKE_SHIFT);
+    joint->tick_s = is.tick_s;
     joint->hold = to_i32((float)hold);
     /* One tick more can still be counted. */
     joint->patience = (uint16_t)(is.patience < UINT16_MAX ? is.patience : UINT16_MAX - 1u);
@@ -1764,6 +1785,22 @@ static bool is_made(const fxt_joint *joint)
 {
     return joint != NULL && joint->rate >= 1 && joint->acceleration >= 1 && joint->acceleration <= MOST_CHANGE &&
            joint->rate <= MOST_CHANGE;
+}
+
+bool fxt_joint_limit_acceleration(fxt_joint *joint, float rad_s2)
+{
+    if (!is_made(joint)) {
+        return false;
+    }
+    const double tick = (double)joint->tick_s, counts = counts_of_rad((double)rad_s2 * tick * tick);
+    if (!may_be(counts, 1.0, DBL_MAX)) {
+        return false;
+    }
+    /* From full speed to full speed back is all that samples within the largest move can do. */
+    const int32_t most = saturate((int64_t)joint->largest_move * 2), bend = to_i32(counts < TURN ? (float)counts : (float)TURN);
+    joint->largest_bend = bend < most ? bend : most;
+    joint->spike = joint->largest_bend;
+    return true;
 }
 
 fxt_mode fxt_joint_mode(const fxt_joint *joint)
@@ -1790,29 +1827,67 @@ void fxt_joint_forget_side(fxt_joint *joint)
     if (joint != NULL) {
         joint->play = kept(&unknown_state);
         joint->flank = NO_FLANK;
+        joint->in_a_row = 0u;
     }
 }
 
-/* A sample, judged: whether it was taken for none, whether the play is where it was thought, whether there was one at all. */
+static uint64_t size_of(int64_t way)
+{
+    return way < 0 ? (uint64_t)0 - (uint64_t)way : (uint64_t)way;
+}
+
+/* A change of the way from tick to tick that noise makes, counts of the generator: twice the dead band. */
+static int32_t noise_of(const fxt_table *table, const fxt_joint *joint)
+{
+    const uint64_t counts = size_of(nominal_generator(table, (int64_t)joint->hold * 2));
+    return counts > (uint64_t)(uint32_t)joint->largest_move ? joint->largest_move : i32((uint32_t)counts);
+}
+
+/* The size of a change; of one below zero one less, as in the core. */
+static inline int32_t bend_size(int32_t bend)
+{
+    return bend < 0 ? sub(-1, bend) : bend;
+}
+
+/* A sample, judged: whether it is there and believed; whether it is not believed, or takes the one before back; whether the side of the play is not
+ * known any more. */
 typedef struct {
-    bool glitch, forgotten, blind;
+    bool good, glitch, back, forgotten;
 } judged;
 
-static judged judge(fxt_joint *now, const fxt_input *input)
+static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
 {
-    const int64_t sample = input->has_generator ? input->generator : now->generator;
-    const uint64_t most = (uint64_t)now->largest_move, beyond = (uint64_t)minus(sample, now->generator) + most;
-    const bool was_sampled = now->sampled != 0u, far = was_sampled && beyond > most * 2u;
-    const uint32_t glitches = far ? now->glitches + 1u : 0u;
-    const bool believed = glitches > now->patience;
+    const bool present = input->has_generator, was_sampled = now->sampled != 0u;
+    const int64_t sample = present ? input->generator : now->generator, way = minus(sample, now->generator);
+    const int32_t step = i32((uint32_t)way), bend = saturate((int64_t)step - now->step), size = bend_size(bend);
+    const int32_t largest_bend = now->largest_bend > noise ? now->largest_bend : noise, spike = now->spike > noise ? now->spike : noise;
+    const bool wide = way != step, far = was_sampled && (wide || magnitude_of(step) > now->largest_move);
+    /* The way of a tick that came late is that of several. */
+    const uint32_t row = present && input->missed_ticks == 0u ? now->in_a_row : 0u;
+    /* The sample before was out, and this one is back: without that one the way would hardly have changed. */
+    const int32_t without = saturate((int64_t)saturate((int64_t)bend + now->bend) + now->bend);
     judged is;
-    is.glitch = far && !believed;
-    now->glitches = (uint16_t)(believed ? 0u : glitches);
-    now->generator = is.glitch ? now->generator : sample;
-    now->sampled = was_sampled || input->has_generator ? 1u : 0u;
+    is.back = row >= HAS_BEND && !wide && size > spike && bend_size(without) <= shifted(size, 1u);
+    const bool bent = row >= HAS_STEP && size > largest_bend, doubted = (far || bent) && !is.back;
+    const uint32_t glitches = doubted ? now->glitches + 1u : 0u;
+    const bool believed = glitches > now->patience;
+    is.glitch = doubted && !believed;
+    is.good = present && !is.glitch;
     /* After too long without an answer of the table nobody followed the play. */
     is.forgotten = believed || (was_sampled && now->uncorrected > now->patience);
-    is.blind = now->sampled == 0u;
+    /* A tick in which a new place is believed has no way. */
+    const uint32_t more = row < HAS_BEND ? row + 1u : HAS_BEND, in_a_row = is.good && !believed ? more : 0u;
+    const uint32_t unseen = now->unseen < UINT16_MAX ? now->unseen + 1u : now->unseen;
+    now->glitches = (uint16_t)(believed ? 0u : glitches);
+    now->generator = is.glitch ? now->generator : sample;
+    now->sampled = was_sampled || is.good ? 1u : 0u;
+    /* The flank that the sample before moved is taken back with it. */
+    now->flank = is.back ? now->flank_before : now->flank;
+    /* One sample or two may each look like motion and be wrong. */
+    now->unseen = (uint16_t)(in_a_row >= HAS_BEND ? 0u : unseen);
+    now->in_a_row = (uint8_t)(is.forgotten ? 0u : in_a_row);
+    now->step = is.back ? add(shifted(step, 1u), shifted(now->step, 1u)) : step;
+    now->bend = is.back ? 0 : bend;
     return is;
 }
 
@@ -1886,8 +1961,12 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
         return standing(input, joint != NULL ? joint->generator : 0);
     }
     const point at = locate(table, input->torque_n_m, input->temperature_c);
-    const judged sample = judge(joint, input);
-    play_state play = sample.forgotten ? unknown_state : state_of(&joint->play);
+    const judged sample = judge(joint, input, noise_of(table, joint));
+    play_state play = state_of(&joint->play);
+    if (sample.back) {
+        play_take_back(&play, joint->without);
+    }
+    play = sample.forgotten ? unknown_state : play;
     const estimate is = estimated(table, &at, &play, joint->generator);
     const int64_t output = plus(is.nominal, is.error);
     const departure from = departure_from(table, &at, input->target, &play, output);
@@ -1895,10 +1974,11 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     const bool near_by = magnitude_of(from.ahead) < joint->hold && joint->flank != NO_FLANK;
     const bool was_backward = joint->flank == FLANK_BACKWARD, backward = near_by ? was_backward : from.backward;
     int32_t found;
-    const bool sane = solve(table, &at, input->target, backward, &found) && is.sane && !sample.blind;
+    const bool sane = solve(table, &at, input->target, backward, &found) && is.sane && joint->sampled != 0u;
     const bool hold = from.hold && !near_by;
     const int32_t open = hold ? from.unknown : from.guess, aimed = sane ? add(open, at.jump) : table->limit;
     const bool late = input->missed_ticks > 0u;
+    joint->flank_before = joint->flank;
     if (sane) {
         joint->flank = (uint8_t)(backward ? FLANK_BACKWARD : FLANK_FORWARD);
     }
@@ -1909,11 +1989,12 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     /* Of what the table wants, whoever holds it back. */
     const int32_t asked = sane ? mul(hold ? add(from.ahead, is.error) : found, FINE) : goal, held_back = sub(asked, correction);
     /* Where the generator is is not known in this tick: the error is any that the table gives. */
-    const bool unseen = sample.glitch || !input->has_generator;
-    const int32_t least = unseen ? add(table->limit, magnitude_of(is.error)) : 0, known = aimed > is.uncertainty ? aimed : is.uncertainty;
+    const int32_t least = sample.good ? 0 : add(table->limit, magnitude_of(is.error)), known = aimed > is.uncertainty ? aimed : is.uncertainty;
     const int32_t uncertainty = known > least ? known : least;
     /* Nothing was seen of the generator yet. */
     joint->play = kept(joint->sampled != 0u ? &play : &unknown_state);
+    joint->without[0] = play.without[0];
+    joint->without[1] = play.without[1];
     joint->missed_ticks += input->missed_ticks;
     fxt_output out;
     out.command = nominal_generator(table, minus(input->target, shifted(correction, 3u)));
@@ -1922,14 +2003,19 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     out.uncertainty_rad = (float)uncertainty * rad_per_count;
     out.correction_rad = (float)correction * (rad_per_count / (float)FINE);
     out.held_back_rad = (float)held_back * (rad_per_count / (float)FINE);
-    out.quality = quality_of(&at, sane, play.lower == play.upper && !unseen);
-    out.flags = (input->has_generator ? 0u : (uint32_t)FXT_SAMPLE_LOST) | (sample.glitch ? (uint32_t)FXT_GLITCH : 0u) |
+    out.quality = quality_of(&at, sane, play.lower == play.upper && sample.good);
+    out.flags = (input->has_generator ? 0u : (uint32_t)FXT_SAMPLE_LOST) | (sample.glitch || sample.back ? (uint32_t)FXT_GLITCH : 0u) |
                 (late ? (uint32_t)FXT_LATE : 0u) | (magnitude_of(held_back) >= FINE ? (uint32_t)FXT_HELD_BACK : 0u) |
                 (sane ? 0u : (uint32_t)FXT_NOT_CORRECTED) | (joint->mode == FXT_SAFE ? (uint32_t)FXT_IN_SAFE_MODE : 0u);
     return out;
 }
 
 /* An encoder (core/src/encoder.rs). */
+
+/* Whether there was a reading; or that nothing shows any more which turn it is in. */
+#define NOT_STARTED 0u
+#define STARTED 1u
+#define LOST 2u
 
 static inline uint64_t most_of_bits(uint8_t bits)
 {
@@ -2003,8 +2089,8 @@ static bool is_encoder(const fxt_encoder *encoder)
 bool fxt_encoder_init(fxt_encoder *encoder, uint32_t counts_per_turn, uint8_t wrap_bits, bool reversed, int64_t zero_counts)
 {
     const int64_t most = INT64_C(1) << 62;
-    const fxt_encoder made = {0u, 0, zero_counts, counts_per_turn, wrap_bits, reversed ? 1u : 0u, 0u};
-    const fxt_encoder none = {0u, 0, 0, 0u, 0u, 0u, 0u};
+    const fxt_encoder made = {0u, 0, zero_counts, counts_per_turn, wrap_bits, reversed ? 1u : 0u, NOT_STARTED};
+    const fxt_encoder none = {0u, 0, 0, 0u, 0u, 0u, NOT_STARTED};
     if (encoder == NULL) {
         return false;
     }
@@ -2022,52 +2108,59 @@ bool fxt_encoder_start(fxt_encoder *encoder, uint64_t reading, int64_t near_coun
     const uint64_t from = encoder_register(encoder, plus(there, encoder->zero_counts));
     encoder->since_zero = plus(there, encoder_way(encoder, from, reading));
     encoder->reading = reading;
-    encoder->started = 1u;
+    encoder->started = STARTED;
     return true;
+}
+
+/* Also where the reading that is kept cannot be: its memory changed. */
+bool fxt_encoder_is_lost(const fxt_encoder *encoder)
+{
+    return !is_encoder(encoder) || encoder->started > STARTED || !can_read(encoder, encoder->reading);
 }
 
 bool fxt_encoder_read(fxt_encoder *encoder, uint64_t reading, int64_t *angle)
 {
-    if (angle == NULL || !is_encoder(encoder) || !can_read(encoder, reading)) {
+    if (angle == NULL || fxt_encoder_is_lost(encoder) || !can_read(encoder, reading)) {
         return false;
     }
-    if (encoder->started == 0u) {
+    if (encoder->started == NOT_STARTED) {
         (void)fxt_encoder_start(encoder, reading, 0);
-    } else if (can_read(encoder, encoder->reading)) {
+    } else {
         encoder->since_zero = plus(encoder->since_zero, encoder_way(encoder, encoder->reading, reading));
         encoder->reading = reading;
-    } else {
-        /* Its memory changed. */
-        return false;
     }
     *angle = encoder_angle(encoder);
     return true;
 }
 
-/* Whether three moves of a tick are less than half of what the register counts. */
-static bool tells_turns(const fxt_encoder *encoder, int32_t largest_move)
+/* A move, 2^-32 turn, in counts, rounded up. */
+static uint64_t counts_of_move(const fxt_encoder *encoder, int32_t largest_move)
 {
-    const uint64_t counts = ((uint64_t)(uint32_t)largest_move * encoder->counts_per_turn >> 32) + 1u;
-    return counts * 6u < (encoder->wrap_bits > 0u ? most_of_bits(encoder->wrap_bits) : (uint64_t)encoder->counts_per_turn);
+    return ((uint64_t)(uint32_t)largest_move * encoder->counts_per_turn >> 32) + 1u;
 }
 
-static uint64_t size_of(int64_t way)
+/* Whether that number of such moves is less than half of what the register counts. */
+static bool half_is_more_than(const fxt_encoder *encoder, int32_t largest_move, uint32_t number)
 {
-    return way < 0 ? (uint64_t)0 - (uint64_t)way : (uint64_t)way;
+    const uint64_t most = encoder->wrap_bits > 0u ? most_of_bits(encoder->wrap_bits) : (uint64_t)encoder->counts_per_turn;
+    return counts_of_move(encoder, largest_move) * ((uint64_t)number * 2u) < most;
 }
 
 bool fxt_joint_read(const fxt_joint *joint, fxt_encoder *encoder, uint64_t reading, int64_t *angle)
 {
-    if (angle == NULL || !is_made(joint) || !is_encoder(encoder) || !can_read(encoder, reading) ||
-        !tells_turns(encoder, joint->largest_move)) {
+    if (angle == NULL || !is_made(joint) || fxt_encoder_is_lost(encoder) || !can_read(encoder, reading) ||
+        !half_is_more_than(encoder, joint->largest_move, 3u)) {
         return false;
     }
-    const int64_t since_zero = encoder_since_zero(encoder, joint->generator);
-    const uint64_t believed = encoder_register(encoder, plus(since_zero, encoder->zero_counts));
-    if (joint->sampled != 0u && encoder->started != 0u &&
-        size_of(encoder_way(encoder, believed, reading)) < size_of(encoder_way(encoder, encoder->reading, reading))) {
-        encoder->since_zero = since_zero;
-        encoder->reading = believed;
+    if (joint->sampled != 0u && encoder->started != NOT_STARTED &&
+        size_of(encoder_way(encoder, encoder->reading, reading)) > counts_of_move(encoder, joint->largest_move)) {
+        /* This tick, and two more: by those the angle that was believed last may be off, where it was a wrong one within the largest move. */
+        if (!half_is_more_than(encoder, joint->largest_move, joint->unseen + 3u)) {
+            encoder->started = LOST;
+            return false;
+        }
+        encoder->since_zero = encoder_since_zero(encoder, joint->generator);
+        encoder->reading = encoder_register(encoder, plus(encoder->since_zero, encoder->zero_counts));
     }
     return fxt_encoder_read(encoder, reading, angle);
 }

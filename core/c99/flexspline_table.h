@@ -265,7 +265,8 @@ typedef struct fxt_limits {
     float tick_s;               /**< time from tick to tick, 1e-7 to 1e3 s */
     float rate_rad_s;           /**< fastest correction: 1.8e-10 to 0.05 rad in a tick */
     float acceleration_rad_s2;  /**< largest acceleration of the correction, no less than 1.8e-10 rad in a tick more each tick; it brakes with half of that */
-    float generator_rate_rad_s; /**< fastest generator: what moves faster from tick to tick is a glitch; 1.5e-9 rad to half a turn in a tick */
+    float generator_rate_rad_s; /**< fastest generator: what moves faster from tick to tick is a glitch; 1.5e-9 rad to half a turn in a tick.
+                                 * Its acceleration: fxt_joint_limit_acceleration */
     float hold_rad;             /**< a target no further from the output is reached on the flank that bears already; 0: none; 1.5e-9 to 0.05 */
     uint16_t patience;          /**< ticks for which a glitch is not believed, and the last correction kept where none can be made */
     uint16_t fade_ticks;        /**< of FXT_FADE_OUT */
@@ -291,11 +292,15 @@ typedef struct fxt_joint {
     int64_t generator;                                   /* the last sample that was believed */
     int32_t correction, goal, speed;                     /* eighths of a count */
     int32_t rate, acceleration, largest_move, hold;      /* eighths of a count in a tick, and more each tick; counts */
-    float fade_step;
+    int32_t largest_bend, spike;                         /* changes of the way from tick to tick: a glitch; an outlier to take back. Counts */
+    int32_t step, bend;                                  /* way in the last tick, and how much longer it was than in the one before */
+    int32_t without[2];                                  /* bounds of the play as if the last sample had not moved it */
+    float fade_step, tick_s;
     uint32_t fading, missed_ticks;
     uint16_t glitches, uncorrected, patience, fade;
+    uint16_t unseen;                                     /* ticks since three samples in a row were believed */
     fxt_mode mode;
-    uint8_t flank, sampled, hold_late;
+    uint8_t flank, flank_before, sampled, hold_late, in_a_row;
 } fxt_joint;
 
 /** One tick's measurements. */
@@ -309,7 +314,7 @@ typedef struct fxt_input {
 /** What happened in a tick: bits of fxt_output.flags, those of the core. */
 typedef enum fxt_flag {
     FXT_SAMPLE_LOST = 1,
-    FXT_GLITCH = 2,         /**< the sample was not believed */
+    FXT_GLITCH = 2,         /**< the sample was not believed; or the one before was wrong, and what it did to the play is taken back */
     FXT_LATE = 4,           /**< ticks were missed */
     FXT_HELD_BACK = 8,      /**< the correction is not what the table wants: limiter, mode or overrun policy hold it back */
     FXT_NOT_CORRECTED = 16, /**< no correction could be made; the last one is kept or fades out */
@@ -332,6 +337,11 @@ typedef struct fxt_output {
 
 /** Makes a joint: off, no correction, the side of the play unknown. One that is refused corrects nothing. NULL limits are refused. */
 fxt_limit fxt_joint_init(fxt_joint *joint, const fxt_limits *limits);
+/** Limits the acceleration of the generator, rad/s^2: a sample that would need more is a glitch, and one that is out and back within two ticks is
+ * taken back. A multiple of what motor and load can do; no less than hold_rad allows for noise. Without this call a sample may need full speed
+ * in one tick, and one that is out and back a 64th of that in each. False, and nothing changes, if it is not finite, or below 1.5e-9 rad in a
+ * tick more each tick, or the joint was not made. */
+bool fxt_joint_limit_acceleration(fxt_joint *joint, float rad_s2);
 /** Changes the mode from the next tick on; false, and nothing changes, if it may not follow: everything may stop, tracking starts from off or
  * hold, hold only from tracking, and safe is left to off alone. One that was not made is in FXT_SAFE. */
 bool fxt_joint_request(fxt_joint *joint, fxt_mode mode);
@@ -362,13 +372,16 @@ bool fxt_encoder_init(fxt_encoder *encoder, uint32_t counts_per_turn, uint8_t wr
  * that was saved. Without this call the first reading is taken nearest to 0: off by whole turns of the register where the generator is not there,
  * and no flag says so. False if the register cannot read that. */
 bool fxt_encoder_start(fxt_encoder *encoder, uint64_t reading, int64_t near_counts);
-/** Takes a reading of the encoder of a joint's generator and tells the angle to give to the next tick, counts of 2^-32 turn, to the nearest. A
- * reading that the tick does not believe (FXT_GLITCH) moves no turn: the next is taken from the reading before or from the angle that was believed
- * last, whichever is nearer. So the turns are right as soon as the readings are, if no more than `patience` in a row were wrong and the generator
- * made less than a third of what the register counts meanwhile. False, and nothing changes: the register cannot read that; there is no joint or no
- * encoder; or generator_rate_rad_s allows a sixth of what the register counts in a tick, so that motion hides a wrong bit. Give the tick no sample
- * then. */
+/** Takes a reading of the encoder of a joint's generator and gives the angle for the next tick, counts of 2^-32 turn, to the nearest. A reading
+ * that the tick does not believe (FXT_GLITCH) moves no turn: one that is further from the one before than a tick allows is taken from the angle
+ * that was believed last, for N ticks; in N + 2 the generator cannot make half of what the register counts. So the turns are right as soon as the
+ * readings are, if no more than N - 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at 500 rad/s. After
+ * more the encoder is lost (fxt_encoder_is_lost): call fxt_encoder_start with what is known otherwise. False, and nothing else changes: the
+ * encoder is lost; the register cannot read that; there is no joint or no encoder; or generator_rate_rad_s allows a sixth of what the register
+ * counts in a tick, so that motion hides a wrong bit. Give the tick no sample then. */
 bool fxt_joint_read(const fxt_joint *joint, fxt_encoder *encoder, uint64_t reading, int64_t *angle);
+/** Whether nothing shows any more which turn the encoder is in, or it is none: start it anew. */
+bool fxt_encoder_is_lost(const fxt_encoder *encoder);
 /** The same for an encoder that no joint judges. Between two readings it moves by less than half of what the register counts; one wrong reading
  * half of that away moves it by all that the register counts, for good. False, and nothing changes, if the register cannot read that. */
 bool fxt_encoder_read(fxt_encoder *encoder, uint64_t reading, int64_t *angle);

@@ -249,6 +249,10 @@ static void make_joint(fxt_joint *joint)
     limits.overrun = (fxt_overrun)word();
     same((uint32_t)fxt_joint_init(joint, &limits) == byte(), "limits of a joint", 4);
     same(fxt_joint_mode(joint) == (joint->rate > 0 ? FXT_OFF : FXT_SAFE), "mode at the start", 4);
+    const bool is_given = byte() != 0u;
+    const float most = number();
+    const bool taken = byte() != 0u;
+    same(is_given ? fxt_joint_limit_acceleration(joint, most) == taken : !taken, "the acceleration of a generator or none", 4);
 }
 
 static void tick(const fxt_table *table, fxt_joint *joint)
@@ -308,11 +312,12 @@ static void call_encoder(fxt_encoder *encoder)
 static void read_by_joint(const fxt_joint *joint, fxt_encoder *encoder)
 {
     const uint64_t asked = (uint64_t)angle();
-    const bool taken = byte() != 0u;
-    const int64_t told = angle();
+    const bool taken = byte() != 0u, is_lost = byte() != 0u;
+    const int64_t expected = angle();
     int64_t found = 0;
     same(fxt_joint_read(joint, encoder, asked, &found) == taken, "a reading for a joint or none", 8);
-    same(!taken || found == told, "angle of a reading for a joint", 8);
+    same(!taken || found == expected, "angle of a reading for a joint", 8);
+    same(fxt_encoder_is_lost(encoder) == is_lost, "an encoder that is lost or not", 8);
 }
 
 /* The memory of an accepted image changes after the check: whatever is read then lies in it, and an error is within the stated limit. */

@@ -449,6 +449,86 @@ static int wrong_bits(void)
     return 0;
 }
 
+/* A joint that follows a steady way, with one sample that is out: output and flags of a tick. */
+static fxt_output steady(const fxt_table *table, fxt_joint *joint, int64_t tick, int64_t step, int64_t out)
+{
+    const fxt_input input = {tick * step + out, tick * step / 95, 5.0f, 20.0f, 0, true};
+    return fxt_tick(table, joint, &input);
+}
+
+/* A lone wrong sample within the largest move is off in its tick; what it did to play and flank is taken back in the next. With the acceleration of
+ * the generator it is not believed, and neither is one beyond it where samples are missing. */
+static int outliers(void)
+{
+    static const float bad[5] = {0.0f, -1.0f, NAN, INFINITY, 1e-6f};
+    static const int64_t sizes[3] = {1 << 24, -(1 << 24), 1 << 27};
+    const made of = plain();
+    fxt_table table;
+    fxt_joint joint;
+    EXPECT(fxt_open(&table, of.image, of.bytes).reason == FXT_OK && fxt_joint_init(&joint, &usual) == FXT_LIMITS_OK);
+    for (int i = 0; i < 5; i++)
+        EXPECT(!fxt_joint_limit_acceleration(&joint, bad[i]) && joint.largest_bend == joint.largest_move);
+    EXPECT(!fxt_joint_limit_acceleration(NULL, 1e3f) && fxt_joint_limit_acceleration(&joint, FLT_MAX) && joint.spike == 2 * joint.largest_move);
+    for (int i = 0; i < 3 * 2; i++) {
+        const bool limited = i % 2 == 1;
+        fxt_joint clean, other;
+        EXPECT(fxt_joint_init(&joint, &usual) == FXT_LIMITS_OK && fxt_joint_request(&joint, FXT_TRACKING));
+        EXPECT(!limited || fxt_joint_limit_acceleration(&joint, 3e3f));
+        for (int64_t tick = 0; tick < 300; tick++)
+            (void)steady(&table, &joint, tick, 1 << 20, 0);
+        clean = joint;
+        const fxt_output before = steady(&table, &clean, 300, 1 << 20, 0), wrong = steady(&table, &joint, 300, 1 << 20, sizes[i / 2]);
+        EXPECT(before.flags == 0u && ((wrong.flags & FXT_GLITCH) != 0u) == limited);
+        /* The largest reaches beyond the target, so that another flank bears. */
+        EXPECT((wrong.output != before.output || limited) && (joint.flank != clean.flank) == (!limited && i / 2 == 2));
+        other = joint;
+        const fxt_output next = steady(&table, &clean, 301, 1 << 20, 0), after = steady(&table, &joint, 301, 1 << 20, 0);
+        EXPECT(after.output == next.output && after.uncertainty_rad == next.uncertainty_rad && joint.flank == clean.flank);
+        EXPECT((after.flags & FXT_GLITCH) == (limited ? 0u : (uint32_t)FXT_GLITCH) && after.quality == FXT_IN_RANGE);
+        /* A whole turn more than back is not back; nor is the way of a late tick, or one that goes on. */
+        fxt_joint turned = other, late = other;
+        EXPECT((steady(&table, &turned, 301, 1 << 20, INT64_C(1) << 32).flags & FXT_GLITCH) != 0u && turned.generator == other.generator);
+        const fxt_input missed = {301 << 20, (301 << 20) / 95, 5.0f, 20.0f, 1, true};
+        EXPECT(limited || fxt_tick(&table, &late, &missed).flags == ((uint32_t)FXT_LATE | (fxt_tick(&table, &other, &missed).flags & FXT_HELD_BACK)));
+    }
+    return 0;
+}
+
+/* Wrong readings in a row of a register of one turn: up to three lose no turn; after more, in a place further away than a tick allows, the encoder is
+ * lost, and says so until it is started anew. */
+static int wrong_in_a_row(void)
+{
+    const made of = plain();
+    const int64_t step = INT64_C(150000000);
+    fxt_table table;
+    fxt_limits limits = usual;
+    limits.generator_rate_rad_s = 500.0f;
+    EXPECT(fxt_open(&table, of.image, of.bytes).reason == FXT_OK);
+    for (int wrongs = 1; wrongs < 9; wrongs++) {
+        fxt_joint joint;
+        fxt_encoder encoder;
+        int64_t now = 0;
+        bool was_lost = false;
+        EXPECT(fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK && fxt_encoder_init(&encoder, 1 << 20, 0, false, 0));
+        EXPECT(fxt_encoder_start(&encoder, 0, INT64_C(3) << 32));
+        for (int64_t tick = 0; tick < 40; tick++) {
+            const int64_t true_angle = (INT64_C(3) << 32) + tick * step;
+            /* By turns half a turn off, and a quarter. */
+            const int64_t off = tick < 5 || tick >= 5 + wrongs ? 0 : tick % 2 == 0 ? INT64_C(1) << 31 : INT64_C(1) << 30;
+            const uint64_t reading = fxt_encoder_reading(&encoder, true_angle + off);
+            const bool read = fxt_joint_read(&joint, &encoder, reading, &now);
+            EXPECT(read != fxt_encoder_is_lost(&encoder));
+            was_lost = was_lost || !read;
+            EXPECT(!read || off != 0 || llabs(now - true_angle) <= 1 << 12);
+            const fxt_input input = {now, 0, 5.0f, 20.0f, 0, read};
+            (void)fxt_tick(&table, &joint, &input);
+        }
+        EXPECT(was_lost == (wrongs > 3));
+        EXPECT(!was_lost || (!fxt_joint_read(&joint, &encoder, 7, &now) && fxt_encoder_start(&encoder, 7, now) && !fxt_encoder_is_lost(&encoder)));
+    }
+    return 0;
+}
+
 static int encoders(void)
 {
     fxt_joint joint;
@@ -465,9 +545,14 @@ static int encoders(void)
     EXPECT(fxt_encoder_read(&encoder, 1024, &angle) && angle == INT64_C(13) << 30);
     EXPECT(!fxt_encoder_read(&encoder, 5000, &angle) && fxt_encoder_read(&encoder, 1025, &angle) && angle == (INT64_C(13) << 30) + (1 << 20));
     EXPECT(fxt_encoder_reading(&encoder, angle) == 1025u);
-    /* Its memory changed. */
+    /* Its memory changed: lost until it is started anew. */
+    EXPECT(fxt_encoder_is_lost(NULL) && !fxt_encoder_is_lost(&encoder));
     encoder.reading = 4096;
-    EXPECT(!fxt_encoder_read(&encoder, 1, &angle));
+    EXPECT(!fxt_encoder_read(&encoder, 1, &angle) && fxt_encoder_is_lost(&encoder));
+    encoder.reading = 0;
+    encoder.started = 3;
+    EXPECT(!fxt_encoder_read(&encoder, 1, &angle) && fxt_encoder_is_lost(&encoder));
+    EXPECT(fxt_encoder_start(&encoder, 1, 0) && !fxt_encoder_is_lost(&encoder));
     /* Without a start: near 0. */
     EXPECT(fxt_encoder_init(&encoder, 4096, 16, true, 0) && fxt_encoder_read(&encoder, 65535, &angle) && angle == 1 << 20);
     EXPECT(!fxt_encoder_read(&encoder, 65536, &angle));
@@ -479,7 +564,9 @@ static int encoders(void)
     EXPECT(!fxt_joint_read(&joint, &encoder, 4096, &angle) && angle == 7);
     joint.sampled = 1u;
     joint.generator = INT64_C(3) << 32;
-    EXPECT(fxt_joint_read(&joint, &encoder, 1, &angle) && angle == 1 << 20 && fxt_joint_read(&joint, &encoder, 0, &angle) && angle == INT64_C(3) << 32);
+    EXPECT(fxt_joint_read(&joint, &encoder, 1, &angle) && angle == 1 << 20 && fxt_joint_read(&joint, &encoder, 0, &angle) && angle == 0);
+    /* Further than a tick allows: from the angle that was believed last. */
+    EXPECT(fxt_joint_read(&joint, &encoder, 1024, &angle) && angle == INT64_C(13) << 30);
     for (int bits = 0; bits <= 64; bits += 13) {
         EXPECT(fxt_encoder_init(&encoder, 4096, (uint8_t)bits, false, 0));
         limits.generator_rate_rad_s = bits == 13 ? 2090.0f : 1040.0f;
@@ -506,7 +593,7 @@ static int radians(void)
 
 int main(void)
 {
-    const int wrong = images() + arithmetic() + plays() + changed() + joints() + wrong_bits() + encoders() + radians();
-    printf("%d of 8 groups of edges are wrong\n", wrong);
+    const int wrong = images() + arithmetic() + plays() + changed() + joints() + wrong_bits() + outliers() + wrong_in_a_row() + encoders() + radians();
+    printf("%d of 10 groups of edges are wrong\n", wrong);
     return wrong != 0;
 }

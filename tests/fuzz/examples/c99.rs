@@ -16,7 +16,8 @@ use std::io::{BufWriter, Write};
 
 /// Records: 1, an image: length, bytes, verdict and what is known of the table. 2, a call: kind, two angles, torque,
 /// temperature, what it gives, and the play after it. 3, a saved play: bytes, and whether they are restored. 4, the
-/// limits of a joint, and which of them is refused. 5, a tick: what is asked of the mode and whether it may be, the
+/// limits of a joint, which of them is refused, the acceleration of its generator if there is one, and whether it is
+/// taken. 5, a tick: what is asked of the mode and whether it may be, the
 /// input, what the tick gives. 6, settings of an encoder, and whether they can be. 8, what a joint makes of a
 /// reading of it, and whether it takes it. 7, a call of it: kind, reading or
 /// angle, whether it is taken, the angle or reading. 0, the end.
@@ -24,31 +25,10 @@ struct Vectors<W> {
     out: W,
     calls: u64,
     ticks: u64,
+    glitches: u64,
+    encoders_lost: u64,
     accepted: u64,
     refused: std::collections::BTreeMap<u8, u64>,
-}
-
-/// A reading as the reader in C99 takes it: from the reading before, or from the angle that was believed last,
-/// whichever is nearer.
-fn read_nearer(
-    joint: &Joint,
-    believed: Option<i64>,
-    encoder: &Encoder,
-    at: &mut EncoderState,
-    reading: u64,
-) -> Option<GeneratorAngle> {
-    let before = encoder.angle(at)?;
-    // A joint without a sample goes on from the reading before, where its limits allow that.
-    let way = joint.read(&JointState::new(), encoder, at, reading)?.counts().wrapping_sub(before);
-    if let Some(believed) = believed {
-        let [from, to] = [encoder.reading(believed), reading].map(|reading| encoder.start(reading, believed));
-        let (from, to) = (from?, to?);
-        let nearer = encoder.angle(&to)?.wrapping_sub(encoder.angle(&from)?);
-        if nearer.unsigned_abs() < way.unsigned_abs() {
-            *at = to;
-        }
-    }
-    encoder.angle(at).map(GeneratorAngle::from_counts)
 }
 
 /// One count, rad.
@@ -344,8 +324,6 @@ impl<W: Write> Vectors<W> {
         let overrun = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks }];
         let overrun = overrun[code.min(2) as usize];
         let made = Joint::new(*table.drive(), limits, overrun);
-        // Which the reader in C99 does not limit.
-        let made = made.map(|joint| joint.with_generator_acceleration(1e30).expect("more than any generator's"));
         let names = ["tick_s", "rate_rad_s", "acceleration_rad_s2", "generator_rate_rad_s", "deadband_rad"];
         let refused = made.as_ref().err().map(|error| names.iter().position(|&name| name == error.name));
         self.out.write_all(&[4])?;
@@ -354,7 +332,18 @@ impl<W: Write> Vectors<W> {
         self.numbers(&[tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, deadband_rad])?;
         self.words(&[u32::from(debounce_ticks) | u32::from(ticks) << 16, code.min(2) as u32])?;
         self.out.write_all(&[refused.map_or(0, |at| at.expect("a setting of these") as u8 + 1)])?;
-        Ok(made.ok())
+        // Without one, with one of a generator, and with any number.
+        let number = mixed.number();
+        let given = match number & 3 {
+            0 => None,
+            1 => Some(f32::from_bits((number >> 8) as u32)),
+            _ => Some(10f64.powf(1.0 + 6.0 * mixed.unit()) as f32),
+        };
+        let limited = made.as_ref().ok().zip(given).and_then(|(joint, most)| joint.with_generator_acceleration(most).ok());
+        self.out.write_all(&[given.is_some() as u8])?;
+        self.numbers(&[given.unwrap_or_default()])?;
+        self.out.write_all(&[limited.is_some() as u8])?;
+        Ok(limited.or(made.ok()))
     }
 
     /// A joint that follows targets, with noise, glitches, samples and ticks that are missing, modes, and inputs that
@@ -373,7 +362,7 @@ impl<W: Write> Vectors<W> {
         let (mut torque, mut target, mut speed) = (0.0, mixed.number() as i64 >> 20, 0i64);
         let mut generator = table.drive().nominal_generator(OutputAngle::from_counts(target)).counts();
         let encoder = self.settings(mixed)?;
-        let (mut at, mut believed) = (None, None);
+        let mut at: Option<EncoderState> = None;
         for tick in 0..ticks {
             let number = mixed.number();
             if tick == 0 || number.is_multiple_of(64) {
@@ -414,10 +403,8 @@ impl<W: Write> Vectors<W> {
                 adjustment: Adjustment::default(),
             };
             let found = joint.tick(images, store, &mut state, &input);
-            if !found.flags.contains(Flags::SAMPLE_LOST) && !found.flags.contains(Flags::GLITCH) {
-                believed = Some(sample);
-            }
-            let told = [
+            self.glitches += u64::from(found.flags.contains(Flags::GLITCH));
+            let reported = [
                 Flags::SAMPLE_LOST,
                 Flags::GLITCH,
                 Flags::OVERRUN,
@@ -425,7 +412,7 @@ impl<W: Write> Vectors<W> {
                 Flags::NOT_CORRECTED,
                 Flags::SAFE,
             ];
-            let known = told.iter().fold(0, |bits, flag| bits | flag.bits());
+            let known = reported.iter().fold(0, |bits, flag| bits | flag.bits());
             assert_eq!(found.flags.bits() & !known, 0, "{:?}", found.flags);
             self.out.write_all(&[5, asked as u8, taken as u8, has_generator as u8])?;
             self.angle(sample)?;
@@ -448,15 +435,25 @@ impl<W: Write> Vectors<W> {
             let number = mixed.number();
             let wrong = if number & 3 == 0 { 1 << (number >> 8 & 31) } else { 0 };
             let reading = encoder.reading(generator) ^ wrong;
-            let started = at.or_else(|| encoder.start(reading, 0));
-            let mut now = started;
-            let read = now.as_mut().and_then(|now| read_nearer(joint, believed, encoder, now, reading));
+            let mut now = at.or_else(|| encoder.start(reading, 0));
+            let read = now.as_mut().and_then(|now| joint.read(&state, encoder, now, reading));
             // Without a start a reading that is not taken begins nothing.
-            at = read.and(now).or(at);
+            at = if read.is_some() || at.is_some() { now } else { None };
+            let is_lost = at.is_some_and(|at| at.is_lost());
             self.out.write_all(&[8])?;
             self.angle(reading as i64)?;
-            self.out.write_all(&[read.is_some() as u8])?;
+            self.out.write_all(&[read.is_some() as u8, is_lost as u8])?;
             self.angle(read.map_or(0, GeneratorAngle::counts))?;
+            // Now and then one that is lost is started anew.
+            if is_lost && number >> 16 & 3 == 0 {
+                self.encoders_lost += 1;
+                let started = encoder.start(reading, generator);
+                at = started.or(at);
+                self.out.write_all(&[7, 0])?;
+                self.angle(reading as i64)?;
+                self.out.write_all(&[started.is_some() as u8])?;
+                self.angle(generator)?;
+            }
         }
         Ok(())
     }
@@ -613,7 +610,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (ticks, images): (usize, usize) = (ticks.parse()?, images.parse()?);
     let out = BufWriter::new(std::fs::File::create(out)?);
-    let mut vectors = Vectors { out, calls: 0, ticks: 0, accepted: 0, refused: Default::default() };
+    let refused = Default::default();
+    let mut vectors = Vectors { out, calls: 0, ticks: 0, glitches: 0, encoders_lost: 0, accepted: 0, refused };
     let mut mixed = Mixed(1);
     let mut sound: Vec<Vec<u8>> = named.iter().map(std::fs::read).collect::<Result<_, _>>()?;
     sound.extend(tables::BASES.iter().cloned());
@@ -659,7 +657,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     vectors.out.write_all(&[0])?;
     vectors.out.flush()?;
-    let Vectors { calls, ticks, accepted, refused, .. } = vectors;
-    println!("{calls} calls, {ticks} ticks of joints, {accepted} images accepted, refused by reason: {refused:?}");
+    let Vectors { calls, ticks, glitches, encoders_lost, accepted, refused, .. } = vectors;
+    println!("{calls} calls, {ticks} ticks of joints, {glitches} glitches, {encoders_lost} encoders lost");
+    println!("{accepted} images accepted, refused by reason: {refused:?}");
     Ok(())
 }
