@@ -86,7 +86,7 @@ static bool is_play(const play_state *play)
 
 static play_state any_play(void)
 {
-    const play_state play = {nondet_long(), nondet_int(), nondet_int(), nondet_int(), nondet_int()};
+    const play_state play = {nondet_long(), nondet_int(), nondet_int(), nondet_int(), nondet_int(), {0, 0}};
     __ESBMC_assume(is_play(&play));
     return play;
 }
@@ -192,6 +192,12 @@ static fxt_joint any_joint(int32_t size)
     joint.fade = (uint16_t)nondet_uint();
     joint.fading = nondet_uint();
     joint.largest_move = nondet_int();
+    joint.largest_bend = nondet_int();
+    joint.spike = nondet_int();
+    joint.step = nondet_int();
+    joint.bend = nondet_int();
+    joint.in_a_row = (uint8_t)nondet_uint();
+    joint.unseen = (uint16_t)nondet_uint();
     joint.generator = nondet_long();
     joint.hold_late = nondet_bool() ? 1u : 0u;
     joint.sampled = nondet_bool() ? 1u : 0u;
@@ -254,6 +260,7 @@ void limits_that_are_accepted_keep_a_joint_in_its_ranges(void)
         PROMISE(joint.rate >= 1 && joint.rate <= MOST_FINE_RATE && joint.acceleration >= 1);
         PROMISE(joint.acceleration <= 2 * joint.rate + 1 && joint.acceleration <= MOST_CHANGE);
         PROMISE(joint.largest_move >= 1 && joint.hold >= 0 && joint.patience < UINT16_MAX);
+        PROMISE(joint.largest_bend == joint.largest_move && joint.spike >= 0 && joint.spike <= joint.largest_move);
         PROMISE(joint.mode == FXT_OFF && joint.correction == 0 && joint.speed == 0 && is_made(&joint));
         END;
     }
@@ -302,11 +309,15 @@ void a_sample_moves_no_further_than_a_tick_allows_or_is_doubted(void)
     fxt_input input;
     input.generator = nondet_long();
     input.has_generator = nondet_bool();
-    const judged is = judge(&joint, &input);
+    input.missed_ticks = (uint16_t)nondet_uint();
+    const judged is = judge(&joint, &input, nondet_int());
     const int64_t way = minus(joint.generator, before.generator);
-    PROMISE((way >= -(int64_t)before.largest_move && way <= before.largest_move) || is.forgotten || before.sampled == 0u);
+    PROMISE((way >= -(int64_t)before.largest_move && way <= before.largest_move) || is.forgotten || is.back || before.sampled == 0u);
     PROMISE(joint.generator == before.generator || (input.has_generator && joint.generator == input.generator));
-    PROMISE(joint.glitches <= joint.patience && (is.blind || joint.sampled != 0u));
+    PROMISE(joint.glitches <= joint.patience && (!is.good || joint.sampled != 0u) && is.good == (input.has_generator && !is.glitch));
+    /* Only after three in a row that were believed, and within a turn, is the one before taken back. */
+    PROMISE(!is.back || (before.in_a_row >= HAS_BEND && is.good && input.missed_ticks == 0u && way >= INT32_MIN && way <= INT32_MAX));
+    PROMISE(joint.in_a_row <= HAS_BEND && (is.good || joint.in_a_row == 0u));
     END;
 }
 

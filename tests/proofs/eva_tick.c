@@ -29,6 +29,7 @@ int main(void)
                              (uint16_t)Frama_C_interval(0, UINT16_MAX), Frama_C_interval(0, 1) == 1};
     const fxt_output out = fxt_tick(&table, &joint, &input);
     (void)fxt_joint_request(&joint, (fxt_mode)Frama_C_interval(0, 9));
+    (void)fxt_joint_limit_acceleration(&joint, any_number());
     Frama_C_make_unknown((char *)&encoder, sizeof encoder);
     (void)fxt_encoder_read(&encoder, (uint64_t)any_angle(), &angle);
     (void)fxt_joint_read(&joint, &encoder, (uint64_t)any_angle(), &angle);
