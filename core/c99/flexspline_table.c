@@ -1861,7 +1861,7 @@ static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
     const int64_t sample = present ? input->generator : now->generator, way = minus(sample, now->generator);
     const int32_t step = i32((uint32_t)way), bend = saturate((int64_t)step - now->step), size = bend_size(bend);
     const int32_t largest_bend = now->largest_bend > noise ? now->largest_bend : noise, spike = now->spike > noise ? now->spike : noise;
-    const bool wide = way != step, far = was_sampled && (wide || magnitude_of(step) > now->largest_move);
+    const bool wide = way != step, far = was_sampled && size_of(way) > (uint64_t)(uint32_t)now->largest_move;
     /* The way of a tick that came late is that of several. */
     const uint32_t row = present && input->missed_ticks == 0u ? now->in_a_row : 0u;
     /* The sample before was out, and this one is back: without that one the way would hardly have changed. */
