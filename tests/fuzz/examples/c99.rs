@@ -339,7 +339,8 @@ impl<W: Write> Vectors<W> {
             1 => Some(f32::from_bits((number >> 8) as u32)),
             _ => Some(10f64.powf(1.0 + 6.0 * mixed.unit()) as f32),
         };
-        let limited = made.as_ref().ok().zip(given).and_then(|(joint, most)| joint.with_generator_acceleration(most).ok());
+        let limited =
+            made.as_ref().ok().zip(given).and_then(|(joint, most)| joint.with_generator_acceleration(most).ok());
         self.out.write_all(&[given.is_some() as u8])?;
         self.numbers(&[given.unwrap_or_default()])?;
         self.out.write_all(&[limited.is_some() as u8])?;
