@@ -1,7 +1,9 @@
 //! Specification of the table to make, its samples, and the node that a sample belongs to.
 
 use super::error::ProjectError;
-use flexspline::shared::grid::{self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, Place};
+use flexspline::shared::grid::{
+    self, ClampedCell, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES,
+};
 use flexspline::shared::image::{MAX_AXIS_VALUE, counted};
 use flexspline::shared::image::{MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, image_bytes};
 use flexspline::{Direction, Drive, Field, GeneratorAngle, ImageError, Table};
@@ -210,7 +212,7 @@ impl<'a> Plan<'a> {
         sample.output_rad - sample.generator_rad / self.drive.exact_ratio()
     }
 
-    pub(super) fn place(nodes: &[f32], value: f64) -> Place {
+    pub(super) fn place(nodes: &[f32], value: f64) -> ClampedCell {
         grid::locate_clamped::<MAX_HALVINGS>(nodes.len(), |i| nodes.get(i).copied().unwrap_or(0.0), value as f32)
     }
 

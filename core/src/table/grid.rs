@@ -124,7 +124,7 @@ crate::upset::upsets!(PeriodicAxis { nodes });
 
 /// A place on a clamped axis: between node `below` and node `above`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Place {
+pub struct ClampedCell {
     /// The node at or below.
     pub below: usize,
     /// The next node; the same one if the axis has only one.
@@ -136,7 +136,7 @@ pub struct Place {
 /// Finds `value` among `len` increasing nodes, at most 2 to the power of `HALVINGS`.
 ///
 /// Always `HALVINGS` comparisons, whatever the data; the weight costs one division. NaN is placed at the first node.
-pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f32, value: f32) -> Place {
+pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f32, value: f32) -> ClampedCell {
     let last_interval = len.saturating_sub(2);
     let mut below = 0usize;
     let mut step = 1usize << HALVINGS;
@@ -154,7 +154,7 @@ pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f
     // (Comparisons, not `min` and `max`: those are library calls on a Cortex-M4F.)
     let positive = if along > 0.0 { along } else { 0.0 };
     let weight = if positive < 1.0 { positive } else { 1.0 };
-    Place { below, above, weight: if above == below { 0.0 } else { weight } }
+    ClampedCell { below, above, weight: if above == below { 0.0 } else { weight } }
 }
 
 /// The interval among starts padded to 64 with a larger number that holds `value`: the last start at or below it, or

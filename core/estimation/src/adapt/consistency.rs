@@ -92,7 +92,7 @@ pub(super) struct HypothesisErrors {
 
 /// Consequence of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Finding {
+pub(super) enum Judgement {
     /// The sensor is not to be believed.
     Sensor,
     /// The learnt coefficients are no longer valid.
@@ -142,11 +142,11 @@ impl Consistency {
     }
 
     /// Judges one measurement. `gate` is the square of the setting.
-    pub(super) fn judge(&mut self, seen: &HypothesisErrors, gate: f32, per_window: f32) -> Finding {
+    pub(super) fn judge(&mut self, seen: &HypothesisErrors, gate: f32, per_window: f32) -> Judgement {
         let impossible = seen.without > gate * (seen.stated + seen.prior);
         self.impossible += (if impossible { 1.0 } else { 0.0 } - self.impossible) * per_window;
         if impossible || self.impossible > 0.5 {
-            return Finding::Sensor;
+            return Judgement::Sensor;
         }
         let (spread, prior_spread) = (seen.noise + seen.learnt, seen.noise + seen.prior);
         let learnt = at_most(seen.with / spread, MOST);
@@ -159,9 +159,9 @@ impl Consistency {
         self.worse += (bounded(seen.with) - bounded(seen.without) - self.worse) * per_window;
         if self.anew >= 1.0 {
             (self.anew, self.worse) = (0.0, 0.0);
-            return Finding::Anew;
+            return Judgement::Anew;
         }
-        Finding::Fade(1.0 - num::within(self.worse, [0.0, 1.0]) * per_window)
+        Judgement::Fade(1.0 - num::within(self.worse, [0.0, 1.0]) * per_window)
     }
 }
 

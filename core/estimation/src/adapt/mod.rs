@@ -61,7 +61,7 @@ mod words;
 pub use settings::{AdaptError, AdaptRestoreError, AdaptSettings, Coefficient, Term};
 pub use state::{AdaptCounters, AdaptState, Learning, Verdict};
 
-use consistency::{Consistency, Finding, HypothesisErrors, per_window};
+use consistency::{Consistency, HypothesisErrors, Judgement, per_window};
 use factors::{dot, measure, spread_of, transform, wander_by};
 use flexspline::shared::{COUNTS_PER_RAD, RAD_PER_COUNT, counts_from_rad, crc32, num, owner, seal};
 use flexspline::{Adjustment, Flags, GeneratorAngle, Input, Joint, Output, OutputAngle, PlayState, Quality, Store};
@@ -368,12 +368,12 @@ impl<const N: usize> OnlineCalibration<N> {
             prior: spread_of(&row, &self.first),
         };
         match state.consistency.judge(&judged, self.gate, self.per_window) {
-            Finding::Sensor => return Verdict::Outlier,
-            Finding::Anew => {
+            Judgement::Sensor => return Verdict::Outlier,
+            Judgement::Anew => {
                 self.open_up(state);
                 return Verdict::Outlier;
             }
-            Finding::Fade(by) => state.x.iter_mut().for_each(|x| *x *= by),
+            Judgement::Fade(by) => state.x.iter_mut().for_each(|x| *x *= by),
         }
         if judged.with > self.gate * (noise + judged.learnt) {
             return Verdict::Outlier;
