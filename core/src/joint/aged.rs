@@ -9,9 +9,15 @@
 /// sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Aged {
-    /// Bits of the value, its age and the largest age, ticks; again, each bit turned.
+    /// Bits of the value, its age and the largest age, ticks; and the [`twin`] of each.
     words: [u32; 3],
     again: [u32; 3],
+}
+
+/// A word once more: each bit inverted, and 16 places further, so that the same bit of all words in a row is not the
+/// same change of both.
+const fn twin(word: u32) -> u32 {
+    !word.rotate_left(16)
 }
 
 impl Aged {
@@ -22,7 +28,7 @@ impl Aged {
     }
 
     const fn of(value: u32, age: u32, most: u32) -> Self {
-        Self { words: [value, age, most], again: [!value, !age, !most] }
+        Self { words: [value, age, most], again: [twin(value), twin(age), twin(most)] }
     }
 
     /// Whether there is no value that may be used.
@@ -33,7 +39,7 @@ impl Aged {
     }
 
     fn is_torn(&self) -> bool {
-        self.words.into_iter().zip(self.again).any(|(one, other)| one != !other)
+        self.words.into_iter().zip(self.again).any(|(one, other)| twin(one) != other)
     }
 
     /// A tick: what was measured in it, if anything; the value to use, or NaN if it is too old, or was hit by an upset
@@ -45,7 +51,7 @@ impl Aged {
         let [value, age, most] = self.words;
         let [_, _, most_again] = self.again;
         // The largest age is not measured anew.
-        let known = most == !most_again;
+        let known = twin(most) == most_again;
         let (value, age) = match measured {
             Some(measured) if known => (measured.to_bits(), 0),
             _ if self.is_torn() => (f32::NAN.to_bits(), most.saturating_add(1)),
@@ -104,6 +110,22 @@ mod tests {
             assert!(again == 6.0 || again.is_nan(), "{bit}");
             (0..3).for_each(|_| assert!([6.0f32.to_bits(), f32::NAN.to_bits()].contains(&hit.tick(None).to_bits())));
             assert!(hit.tick(None).is_nan(), "{bit}");
+        }
+    }
+
+    /// The same bit of any words in a row.
+    #[test]
+    fn a_column_of_a_measurement_is_never_used() {
+        let mut sound = Aged::new(3);
+        let _ = sound.tick(Some(5.0));
+        let words = sound.bits() / 32;
+        for (bit, first) in (0..32).flat_map(|bit| (0..words).map(move |first| (bit, first))) {
+            let mut hit = sound;
+            for word in first..words {
+                hit.flip(32 * word + bit, &mut String::new());
+                let mut asked = hit;
+                assert!(hit.is_stale() && asked.tick(None).is_nan(), "{bit} {first} {word}");
+            }
         }
     }
 }
