@@ -322,15 +322,6 @@ mod tests {
     }
 
     #[test]
-    fn steady_motion_lags_by_the_half_width() {
-        let mut state = PlayState::unknown();
-        run(&mut state, 0, &[0, 2 * HALF]);
-        assert_eq!((state.lower, state.upper), (-HALF, -HALF));
-        run(&mut state, 2 * HALF as i64, &[-2 * HALF]);
-        assert_eq!((state.lower, state.upper), (HALF, HALF));
-    }
-
-    #[test]
     fn an_unknown_state_shrinks_with_motion_and_stays_known() {
         let mut state = PlayState::unknown();
         assert_eq!(state.offset_rad(), 0.0);
@@ -392,59 +383,6 @@ mod tests {
     }
 
     proptest! {
-        /// Rate independence: cutting every move into pieces changes nothing.
-        #[test]
-        fn only_the_turning_points_matter(
-            path in prop::collection::vec(-3 * HALF..3 * HALF, 1..30), pieces in 1i32..7,
-        ) {
-            let (mut coarse, mut fine) = (PlayState::unknown(), PlayState::unknown());
-            let cut: Vec<i32> = path.iter()
-                .flat_map(|&step| {
-                    let part = step / pieces;
-                    (0..pieces - 1).map(move |_| part).chain([step - part * (pieces - 1)])
-                })
-                .collect();
-            run(&mut coarse, 0, &[0]);
-            run(&mut fine, 0, &[0]);
-            run(&mut coarse, 0, &path);
-            run(&mut fine, 0, &cut);
-            prop_assert_eq!(coarse, fine);
-        }
-
-        /// Wiping-out: an excursion inside a larger one that returns past its start leaves no memory.
-        #[test]
-        fn a_larger_stroke_wipes_out_a_smaller_one(
-            before in -5 * HALF..5 * HALF, small in 1..5 * HALF, extra in 0..5 * HALF,
-        ) {
-            let (mut with, mut without) = (known(), known());
-            let x = run(&mut with, 0, &[before, small, -small, small + extra]);
-            let y = run(&mut without, 0, &[before, small + extra]);
-            prop_assert_eq!(x, y);
-            prop_assert_eq!(with, without);
-        }
-
-        /// Congruency: closed loops between the same turning points have the same shape, whatever came before.
-        #[test]
-        fn loops_between_the_same_extremes_are_congruent(
-            first in prop::collection::vec(-3 * HALF..3 * HALF, 0..8),
-            second in prop::collection::vec(-3 * HALF..3 * HALF, 0..8),
-            amplitude in 1..4 * HALF, part in 0i32..=100,
-        ) {
-            let mut rise = [0i64; 2];
-            for (history, rise) in [&first, &second].into_iter().zip(&mut rise) {
-                let mut state = known();
-                let back = -history.iter().sum::<i32>();
-                // To the lower extreme, around the loop once so that it is closed, then up a part of it.
-                let mut x = run(&mut state, 0, history);
-                x = run(&mut state, x, &[back, amplitude, -amplitude]);
-                let start = x + state.lower as i64;
-                let step = (amplitude as i64 * part as i64 / 100) as i32;
-                x = run(&mut state, x, &[step]);
-                *rise = x + state.lower as i64 - start;
-            }
-            prop_assert_eq!(rise[0], rise[1]);
-        }
-
         /// The truth, wherever it started, never leaves the interval; the interval never widens.
         #[test]
         fn the_interval_holds_every_possible_truth(
