@@ -84,8 +84,16 @@ fn the_address_lets_in_and_nothing_else_does() {
     for path in ["/", "/api/state", "/files/a.csv", "/app/bench.js", "/nothing", "/?token=0123", "/?token="] {
         assert_eq!(get(path, "").status, 403, "{path}");
     }
-    let wrong = cookie.replace(token.as_str(), &"0".repeat(token.len()));
-    assert_eq!(get("/", &format!("Cookie: {wrong}\r\n")).status, 403);
+    let name = cookie.split_once('=').unwrap().0;
+    for (cookie, status) in [
+        (format!("{name}={}", "0".repeat(token.len())), 403),
+        (format!("flexspline-1={token}"), 403),
+        (format!("{cookie}0"), 403),
+        (name.to_owned(), 403),
+        (format!("other=1; {cookie}; x=y"), 200),
+    ] {
+        assert_eq!(get("/", &format!("Cookie: {cookie}\r\n")).status, status, "{cookie}");
+    }
     let page = get("/", &format!("Cookie: {cookie}\r\n"));
     assert_eq!(page.status, 200);
     assert!(page.head.contains("content-security-policy: default-src 'none'; script-src 'self'"), "{}", page.head);
@@ -108,15 +116,26 @@ fn a_request_by_another_name_or_of_another_page_is_refused() {
     for (name, more) in [
         (evil.as_str(), ""),
         ("127.0.0.1", ""),
+        ("127.0.0.1:1", ""),
+        (host, "Host: evil.example\r\n"),
         (host, "Origin: http://evil.example\r\n"),
         (host, "Origin: null\r\n"),
+        (host, &format!("Origin: https://{host}\r\n")),
+        (host, &format!("Origin: http://{host}.evil.example\r\n")),
+        (host, &format!("Origin: http://localhost:{port}\r\n")),
+        (host, &format!("Origin: http://{host}\r\nOrigin: http://evil.example\r\n")),
         (host, "Sec-Fetch-Site: cross-site\r\n"),
+        (host, "Sec-Fetch-Site: same-site\r\n"),
     ] {
         for path in ["/", "/api/state", &format!("/?token={token}")] {
             let request =
                 format!("GET {path} HTTP/1.1\r\nHost: {name}\r\nCookie: {cookie}\r\n{more}Connection: close\r\n\r\n");
             assert_eq!(bench.raw(&request).status, 403, "{name} {more} {path}");
         }
+    }
+    for (name, more) in [(host.replace("127.0.0.1", "localhost"), ""), (host.clone(), "Sec-Fetch-Site: none\r\n")] {
+        let request = format!("GET / HTTP/1.1\r\nHost: {name}\r\nCookie: {cookie}\r\n{more}Connection: close\r\n\r\n");
+        assert_eq!(bench.raw(&request).status, 200, "{name} {more}");
     }
     // What changes something says that it is of this server.
     let request = format!(
@@ -139,6 +158,12 @@ fn nothing_outside_the_folder_is_sent_or_written() {
     fs::write(outside.path().join("secret"), "secret").unwrap();
     symlink(outside.path().join("secret"), bench.place.path().join("link.csv")).unwrap();
     symlink(outside.path(), bench.place.path().join("way")).unwrap();
+    fs::create_dir(bench.place.path().join("out")).unwrap();
+    fs::write(bench.place.path().join("out/b.json"), "{}").unwrap();
+    symlink(bench.place.path().join("out"), bench.place.path().join("within")).unwrap();
+    assert_eq!(bench.ask("GET", "/files/out/b.json", "").body, "{}");
+    let listed = bench.ask("GET", "/api/state", "").body;
+    assert!(listed.contains("out/b.json") && !listed.contains("link.csv") && !listed.contains("within"), "{listed}");
     assert_eq!(bench.ask("GET", "/files/a.csv", "").body, "t,x\n1,2\n");
     for path in [
         "/files/../secret",
@@ -148,6 +173,11 @@ fn nothing_outside_the_folder_is_sent_or_written() {
         "/files/%2fetc/passwd",
         "/files/link.csv",
         "/files/way/secret",
+        "/files/within/b.json",
+        "/files/out//b.json",
+        "/files/out",
+        "/files/out/",
+        "/files/absent",
         "/files/.hidden",
         "/files/a.csv%00",
         "/files/",
