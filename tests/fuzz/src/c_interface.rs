@@ -6,112 +6,13 @@
 use crate::Choices;
 use crate::tables::BASES;
 use flexspline_c as c;
+use flexspline_c::{
+    FlexsplineImages as Images, FlexsplineInput as Input, FlexsplineOutput as Output, FlexsplineSettings as Settings,
+};
 use std::mem::{align_of, size_of};
 use std::ptr::{null, null_mut};
 
-/// As in `core/include/flexspline.h`.
-#[repr(C)]
-#[derive(Clone, Copy)]
-struct Settings {
-    teeth: [u16; 2],
-    fixed_member: u8,
-    overrun: u8,
-    fade_ticks: u16,
-    patience: u16,
-    tick_s: f32,
-    rate_rad_s: f32,
-    acceleration_rad_s2: f32,
-    generator_rate_rad_s: f32,
-    hold_rad: f32,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy)]
-struct Images {
-    first: *const u8,
-    first_bytes: usize,
-    second: *const u8,
-    second_bytes: usize,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy)]
-struct Input {
-    generator_counts: i64,
-    target_counts: i64,
-    torque_n_m: f32,
-    missed_ticks: u16,
-    has_generator: u8,
-    mean_counts: i32,
-    half_width_counts: i32,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-struct Output {
-    command_counts: i64,
-    output_counts: i64,
-    transmission_error_rad: f32,
-    uncertainty_rad: f32,
-    correction_rad: f32,
-    held_back_rad: f32,
-    quality: u8,
-    flags: u16,
-}
-
 type Object = *mut u64;
-
-// As C calls them: pointers to structures of its own.
-unsafe fn flexspline_store_init(store: Object) -> u32 {
-    flexspline_c::flexspline_store_init(store.cast()) as u32
-}
-unsafe fn flexspline_joint_init(joint: Object, settings: *const Settings) -> u32 {
-    flexspline_c::flexspline_joint_init(joint.cast(), settings.cast()) as u32
-}
-unsafe fn flexspline_state_init(state: Object) -> u32 {
-    flexspline_c::flexspline_state_init(state.cast()) as u32
-}
-unsafe fn flexspline_store_activate(store: Object, joint: Object, table: *const Images, temperature_c: f32) -> u32 {
-    flexspline_c::flexspline_store_activate(store.cast(), joint.cast(), table.cast(), temperature_c) as u32
-}
-unsafe fn flexspline_store_set_temperature(store: Object, table: *const Images, temperature_c: f32) -> u32 {
-    flexspline_c::flexspline_store_set_temperature(store.cast(), table.cast(), temperature_c) as u32
-}
-unsafe fn flexspline_store_check_images(store: Object, table: *const Images, words: u16) -> u32 {
-    flexspline_c::flexspline_store_check_images(store.cast(), table.cast(), words) as u32
-}
-unsafe fn flexspline_state_request(state: Object, mode: u8) -> u32 {
-    flexspline_c::flexspline_state_request(state.cast(), mode) as u32
-}
-unsafe fn flexspline_state_save(state: Object, joint: Object, store: Object, saved: *mut u8) -> u32 {
-    flexspline_c::flexspline_state_save(state.cast(), joint.cast(), store.cast(), saved.cast()) as u32
-}
-unsafe fn flexspline_state_restore(state: Object, joint: Object, store: Object, saved: *const u8) -> u32 {
-    flexspline_c::flexspline_state_restore(state.cast(), joint.cast(), store.cast(), saved.cast()) as u32
-}
-unsafe fn flexspline_state_forget_side(state: Object) -> u32 {
-    flexspline_c::flexspline_state_forget_side(state.cast()) as u32
-}
-unsafe fn flexspline_joint_mend(joint: Object) -> u32 {
-    flexspline_c::flexspline_joint_mend(joint.cast()) as u32
-}
-unsafe fn flexspline_state_report(state: Object, report: Object) -> u32 {
-    flexspline_c::flexspline_state_report(state.cast(), report.cast()) as u32
-}
-unsafe fn flexspline_store_report(store: Object, report: Object) -> u32 {
-    flexspline_c::flexspline_store_report(store.cast(), report.cast()) as u32
-}
-unsafe fn flexspline_tick(
-    joint: Object,
-    table: *const Images,
-    store: Object,
-    state: Object,
-    input: *const Input,
-    output: *mut Output,
-) -> u32 {
-    flexspline_c::flexspline_tick(joint.cast(), table.cast(), store.cast(), state.cast(), input.cast(), output.cast())
-        as u32
-}
 
 const OK: u32 = 0;
 const POINTER: u32 = 1;
@@ -243,6 +144,13 @@ impl Memory {
     }
 }
 
+impl Choices<'_> {
+    /// The usual number, or now and then any.
+    fn mostly(&mut self, usual: f32) -> f32 {
+        if self.below(4) == 0 { self.wild() } else { usual }
+    }
+}
+
 /// A pointer to a structure; or null, or beside it.
 fn plain<T>(choices: &mut Choices<'_>, value: &[T; 2]) -> (*const T, bool) {
     let right: *const T = value.as_ptr();
@@ -255,7 +163,8 @@ fn plain<T>(choices: &mut Choices<'_>, value: &[T; 2]) -> (*const T, bool) {
 
 fn any_settings(choices: &mut Choices<'_>) -> Settings {
     let mut settings = Settings {
-        teeth: [188, 190],
+        flexspline_teeth: 188,
+        circular_spline_teeth: 190,
         fixed_member: 0,
         overrun: choices.below(3) as u8,
         fade_ticks: 1 + choices.any::<u8>() as u16,
@@ -267,7 +176,7 @@ fn any_settings(choices: &mut Choices<'_>) -> Settings {
         hold_rad: 0.0,
     };
     match choices.below(12) {
-        1 => settings.teeth = choices.any(),
+        1 => [settings.flexspline_teeth, settings.circular_spline_teeth] = choices.any(),
         2 => settings.fixed_member = choices.any(),
         3 => settings.overrun = choices.any(),
         4 => settings.fade_ticks = 0,
@@ -387,9 +296,11 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
     let start_up = memory.beside(choices, 12);
     let (store, joint, state) = (o.store, o.joint, o.state);
     let all = |objects: &[Given]| objects.iter().all(|object| object.usable);
+    // Of a call that writes nothing but its objects, and of one that answers.
+    let done = |status: c::FlexsplineStatus, objects: &[Given]| (status as u32, all(objects), false);
     let records: *mut c::FlexsplineRecord = memory.at(PLACES.records).cast();
     let buffer: *mut u8 = memory.at(PLACES.buffer).cast();
-    let output = [c::FlexsplineOutput {
+    let output = [Output {
         command_counts: choices.any(),
         output_counts: choices.any(),
         transmission_error_rad: choices.wild(),
@@ -404,11 +315,11 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
     match choices.below(50) {
         0 => {
             let settings = [c::FlexsplineLearnSettings {
-                noise_rad: if choices.below(4) == 0 { choices.wild() } else { 2e-6 },
-                memory_measurements: if choices.below(4) == 0 { choices.wild() } else { 100.0 },
-                gate: if choices.below(4) == 0 { choices.wild() } else { 5.0 },
+                noise_rad: choices.mostly(2e-6),
+                memory_measurements: choices.mostly(100.0),
+                gate: choices.mostly(5.0),
                 settle_rad: 1e-5,
-                torque_limit_n_m: if choices.below(4) == 0 { choices.wild() } else { 20.0 },
+                torque_limit_n_m: choices.mostly(20.0),
             }; 2];
             let (settings, plain_ok) = plain(choices, &settings);
             let mut list = [c::FlexsplineCoefficient { limit: 1e-4, initial_std: 1e-5, term: 0, order: 0 }; 16];
@@ -422,15 +333,15 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let status = c::flexspline_learner_init(learner.pointer.cast(), settings, list.as_ptr(), number);
             (status as u32, learner.usable && plain_ok, false)
         }
-        1 => (c::flexspline_learner_set(learner.pointer.cast(), choices.below(4) as u8) as u32, learner.usable, false),
-        2 if choices.any() => (c::flexspline_learner_reset(learner.pointer.cast()) as u32, learner.usable, false),
+        1 => done(c::flexspline_learner_set(learner.pointer.cast(), choices.below(4) as u8), &[learner]),
+        2 if choices.any() => done(c::flexspline_learner_reset(learner.pointer.cast()), &[learner]),
         2 => {
             let (at, of) = (learner.pointer.cast(), (joint.pointer.cast(), store.pointer.cast()));
             let status = c::flexspline_learner_bind(at, of.0, of.1, choices.any());
             (status as u32, all(&[learner, joint, store]), false)
         }
         3..=6 => {
-            let input = [c::FlexsplineInput {
+            let input = [Input {
                 generator_counts: choices.any::<i32>().into(),
                 target_counts: 0,
                 torque_n_m: choices.wild(),
@@ -480,10 +391,8 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let saved: *const u8 = memory.at(PLACES.saved).cast::<u8>().cast_const();
             let length = choices.below(8 * OTHER_WORDS);
             match choices.any() {
-                true => {
-                    (c::flexspline_learner_restore(learner.pointer.cast(), saved, length) as u32, learner.usable, false)
-                }
-                false => (c::flexspline_slip_restore(slip.pointer.cast(), saved, length) as u32, slip.usable, false),
+                true => done(c::flexspline_learner_restore(learner.pointer.cast(), saved, length), &[learner]),
+                false => done(c::flexspline_slip_restore(slip.pointer.cast(), saved, length), &[slip]),
             }
         }
         12 => {
@@ -494,10 +403,9 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 }
             }
             let variable = choices.below(3) as u8;
-            let status = c::flexspline_slip_init(slip.pointer.cast(), variable, list.as_ptr(), number);
-            (status as u32, slip.usable, false)
+            done(c::flexspline_slip_init(slip.pointer.cast(), variable, list.as_ptr(), number), &[slip])
         }
-        13 => (c::flexspline_slip_set(slip.pointer.cast(), choices.below(3) as u8) as u32, slip.usable, false),
+        13 => done(c::flexspline_slip_set(slip.pointer.cast(), choices.below(3) as u8), &[slip]),
         14..=16 => {
             let to = memory.answer::<c::FlexsplineSlipReport>(choices, &[slip]);
             let status = match choices.any() {
@@ -512,15 +420,14 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         17 => {
             let settings = [c::FlexsplineTorqueSettings {
-                tick_s: if choices.below(4) == 0 { choices.wild() } else { 1e-3 },
-                bandwidth_hz: if choices.below(4) == 0 { choices.wild() } else { 20.0 },
-                drag_n_m: if choices.below(4) == 0 { choices.wild() } else { 0.5 },
+                tick_s: choices.mostly(1e-3),
+                bandwidth_hz: choices.mostly(20.0),
+                drag_n_m: choices.mostly(0.5),
                 table_drag_n_m: 0.1,
                 hold_n_m: 0.1,
             }; 2];
             let (settings, plain_ok) = plain(choices, &settings);
-            let [settle, largest] =
-                [0.05, 100.0].map(|usual| if choices.below(4) == 0 { choices.wild() } else { usual });
+            let [settle, largest] = [0.05, 100.0].map(|usual| choices.mostly(usual));
             let made = if choices.below(2) == 0 {
                 c::flexspline_torque_init(path.pointer.cast(), settings)
             } else {
@@ -534,7 +441,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let status = c::flexspline_torque_tick(path.pointer.cast(), place, choices.wild(), direction, to.pointer);
             (status as u32, path.usable && to.usable, to.overlaps)
         }
-        19 => (c::flexspline_aged_init(aged.pointer.cast(), choices.any()) as u32, aged.usable, false),
+        19 => done(c::flexspline_aged_init(aged.pointer.cast(), choices.any()), &[aged]),
         20 => {
             let to = memory.answer(choices, &[aged]);
             let status =
@@ -558,8 +465,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         23 => {
             let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
-            let status = c::flexspline_encoder_start(encoder.pointer.cast(), reading, choices.any());
-            (status as u32, encoder.usable, false)
+            done(c::flexspline_encoder_start(encoder.pointer.cast(), reading, choices.any()), &[encoder])
         }
         24 => {
             let to = memory.answer(choices, &[joint, state, encoder]);
@@ -582,8 +488,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         27 => {
             let (places, offset) = (choices.below(RECORDS + 1) as u16, choices.below(3) as u32);
             let (divisor, full) = (choices.below(4) as u32, choices.below(3) as u8);
-            let status = c::flexspline_recorder_init(recorder.pointer.cast(), places, divisor, offset, full);
-            (status as u32, recorder.usable, false)
+            done(c::flexspline_recorder_init(recorder.pointer.cast(), places, divisor, offset, full), &[recorder])
         }
         28 | 29 => {
             let inside = choices.below(8) == 0;
@@ -609,10 +514,10 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         31 => {
             let (from, to) = (memory.at(PLACES.saved), memory.answer(choices, &[]));
             match choices.any() {
-                true => (c::flexspline_record_encode(from.cast(), to.pointer) as u32, to.usable, false),
+                true => done(c::flexspline_record_encode(from.cast(), to.pointer), &[to]),
                 false => {
                     let to = memory.answer(choices, &[]);
-                    (c::flexspline_record_decode(from.cast(), to.pointer) as u32, to.usable, false)
+                    done(c::flexspline_record_decode(from.cast(), to.pointer), &[to])
                 }
             }
         }
@@ -623,7 +528,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             (status as u32, all(&[state, store]) && output_usable && to.usable, to.overlaps)
         }
         33 => match choices.any() {
-            true => (c::flexspline_watch_init(watch.pointer.cast()) as u32, watch.usable, false),
+            true => done(c::flexspline_watch_init(watch.pointer.cast()), &[watch]),
             false => {
                 let to = memory.answer(choices, &[watch, state, store]);
                 let (state_at, store_at) = (state.pointer.cast(), store.pointer.cast());
@@ -642,7 +547,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             (c::flexspline_predictor_init(predictor.pointer.cast(), parts) as u32, predictor.usable && plain_ok, false)
         }
         35 => match choices.any() {
-            true => (c::flexspline_observer_init(observer.pointer.cast()) as u32, observer.usable, false),
+            true => done(c::flexspline_observer_init(observer.pointer.cast()), &[observer]),
             false => {
                 let to = memory.answer(choices, &[observer]);
                 let status = c::flexspline_observer_report(observer.pointer.cast(), to.pointer);
@@ -763,7 +668,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             )
         }
         44 => match choices.below(4) {
-            0 => (c::flexspline_identity_begin(identity.pointer.cast()) as u32, identity.usable, false),
+            0 => done(c::flexspline_identity_begin(identity.pointer.cast()), &[identity]),
             1 => {
                 let to = memory.answer(choices, &[identity]);
                 let image = &BASES[choices.below(3)];
@@ -793,8 +698,8 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         },
         45 => {
             let settings = [c::FlexsplineStartUpSettings {
-                way_rad: if choices.below(4) == 0 { choices.wild() } else { 20.0 },
-                drag_n_m: if choices.below(4) == 0 { choices.wild() } else { 1.0 },
+                way_rad: choices.mostly(20.0),
+                drag_n_m: choices.mostly(1.0),
                 ticks: if choices.below(4) == 0 { choices.any() } else { 8 },
                 ..START_UP
             }; 2];
@@ -831,19 +736,20 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         48 => {
             let jump = if choices.any() { 5.0 } else { choices.wild() };
-            let status = c::flexspline_torque_set_sensor(path.pointer.cast(), jump, choices.any());
-            (status as u32, path.usable, false)
+            done(c::flexspline_torque_set_sensor(path.pointer.cast(), jump, choices.any()), &[path])
         }
         _ => {
             let announced = choices.below(8 * BUFFER_WORDS + 20);
             match choices.below(6) {
-                0 => (c::flexspline_upload_begin(upload.pointer.cast(), announced) as u32, upload.usable, false),
+                0 => done(c::flexspline_upload_begin(upload.pointer.cast(), announced), &[upload]),
                 1 | 2 => {
                     let (offset, length) = (choices.below(40), choices.below(40));
                     let chunk = BASES[0].as_ptr();
                     let upload_at = upload.pointer.cast();
-                    let status = c::flexspline_upload_chunk(upload_at, buffer, 8 * BUFFER_WORDS, offset, chunk, length);
-                    (status as u32, upload.usable, false)
+                    done(
+                        c::flexspline_upload_chunk(upload_at, buffer, 8 * BUFFER_WORDS, offset, chunk, length),
+                        &[upload],
+                    )
                 }
                 3 => {
                     let to = memory.answer(choices, &[upload]);
@@ -888,7 +794,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                     assert!(c::flexspline_rad_from_counts(from).is_finite());
                     let answer = memory.answer(choices, &[]);
                     let rad = f64::from(choices.wild());
-                    (c::flexspline_counts_from_rad(rad, answer.pointer) as u32, answer.usable, false)
+                    done(c::flexspline_counts_from_rad(rad, answer.pointer), &[answer])
                 }
             }
         }
@@ -931,11 +837,10 @@ pub fn run(data: &[u8]) {
     // Half of the runs begin with what a firmware begins with.
     if choices.any() {
         let settings = any_settings(&mut Choices::new(&[]));
-        unsafe {
-            assert_eq!(flexspline_store_init(memory.at(PLACES.stores[0])), OK);
-            assert_eq!(flexspline_joint_init(memory.at(PLACES.joints[0]), &settings), OK);
-            assert_eq!(flexspline_state_init(memory.at(PLACES.states[0])), OK);
-        }
+        let [store, joint, state] = [PLACES.stores, PLACES.joints, PLACES.states].map(|places| memory.at(places[0]));
+        assert_eq!(c::flexspline_store_init(store.cast()) as u32, OK);
+        assert_eq!(c::flexspline_joint_init(joint.cast(), &settings) as u32, OK);
+        assert_eq!(c::flexspline_state_init(state.cast()) as u32, OK);
         begin_beside(&memory);
     }
     let mut kept = Vec::new();
@@ -951,6 +856,7 @@ pub fn run(data: &[u8]) {
         let store = memory.object(&mut choices, PLACES.stores);
         let joint = memory.object(&mut choices, PLACES.joints);
         let state = memory.object(&mut choices, PLACES.states);
+        let (joint_at, store_at, state_at) = (joint.pointer.cast(), store.pointer.cast(), state.pointer.cast());
         let tables = [table; 2];
         let (tables, plain_ok) = plain(&mut choices, &tables);
         let before = memory.copy();
@@ -958,33 +864,32 @@ pub fn run(data: &[u8]) {
         // SAFETY of the calls: every pointer that is aligned and not null points into the memory, or to what is kept.
         let mut loose = false;
         let (status, usable, refused) = match choices.below(18) {
-            0 => (unsafe { flexspline_store_init(store.pointer) }, store.usable, false),
+            0 => (c::flexspline_store_init(store_at) as u32, store.usable, false),
             1 => {
                 let settings = [any_settings(&mut choices); 2];
                 let (settings, plain_ok) = plain(&mut choices, &settings);
-                (unsafe { flexspline_joint_init(joint.pointer, settings) }, joint.usable && plain_ok, false)
+                (c::flexspline_joint_init(joint_at, settings) as u32, joint.usable && plain_ok, false)
             }
-            2 => (unsafe { flexspline_state_init(state.pointer) }, state.usable, false),
+            2 => (c::flexspline_state_init(state_at) as u32, state.usable, false),
             3 | 4 => {
-                let status = unsafe { flexspline_store_activate(store.pointer, joint.pointer, tables, temperature) };
+                let status = c::flexspline_store_activate(store_at, joint_at, tables, temperature) as u32;
                 (status, store.usable && joint.usable && plain_ok && table_usable, false)
             }
             5 => {
-                let status = unsafe { flexspline_store_set_temperature(store.pointer, tables, temperature) };
+                let status = c::flexspline_store_set_temperature(store_at, tables, temperature) as u32;
                 (status, store.usable && plain_ok && table_usable, false)
             }
             6 => {
-                let status =
-                    unsafe { flexspline_store_check_images(store.pointer, tables, choices.below(2000) as u16) };
+                let status = c::flexspline_store_check_images(store_at, tables, choices.below(2000) as u16) as u32;
                 (status, store.usable && plain_ok && table_usable, false)
             }
-            7 => (unsafe { flexspline_state_request(state.pointer, choices.below(6) as u8) }, state.usable, false),
+            7 => (c::flexspline_state_request(state_at, choices.below(6) as u8) as u32, state.usable, false),
             8 => {
                 let inside = choices.below(4) == 0;
                 let saved =
                     if inside { state.pointer.wrapping_byte_add(choices.below(180)) } else { memory.at(PLACES.saved) };
                 let saved = if choices.below(12) == 0 { null_mut() } else { saved.cast::<u8>() };
-                let status = unsafe { flexspline_state_save(state.pointer, joint.pointer, store.pointer, saved) };
+                let status = c::flexspline_state_save(state_at, joint_at, store_at, saved.cast()) as u32;
                 (status, state.usable && joint.usable && store.usable && !saved.is_null(), inside && !saved.is_null())
             }
             9 => {
@@ -992,17 +897,17 @@ pub fn run(data: &[u8]) {
                 let saved =
                     if inside { state.pointer.wrapping_byte_add(choices.below(180)) } else { memory.at(PLACES.saved) };
                 let saved = if choices.below(12) == 0 { null() } else { saved.cast::<u8>().cast_const() };
-                let status = unsafe { flexspline_state_restore(state.pointer, joint.pointer, store.pointer, saved) };
+                let status = c::flexspline_state_restore(state_at, joint_at, store_at, saved.cast()) as u32;
                 (status, state.usable && joint.usable && store.usable && !saved.is_null(), inside && !saved.is_null())
             }
-            10 => (unsafe { flexspline_state_forget_side(state.pointer) }, state.usable, false),
-            11 => (unsafe { flexspline_joint_mend(joint.pointer) }, joint.usable, false),
+            10 => (c::flexspline_state_forget_side(state_at) as u32, state.usable, false),
+            11 => (c::flexspline_joint_mend(joint_at) as u32, joint.usable, false),
             12 => {
-                let status = unsafe { flexspline_state_report(state.pointer, memory.at(PLACES.saved)) };
+                let status = c::flexspline_state_report(state_at, memory.at(PLACES.saved).cast()) as u32;
                 (status, state.usable, false)
             }
             13 => {
-                let status = unsafe { flexspline_store_report(store.pointer, memory.at(PLACES.saved)) };
+                let status = c::flexspline_store_report(store_at, memory.at(PLACES.saved).cast()) as u32;
                 (status, store.usable, false)
             }
             16 | 17 => {
@@ -1030,8 +935,7 @@ pub fn run(data: &[u8]) {
                     2 => (inside.pointer.wrapping_add(choices.below(12)).cast(), inside.usable, true),
                     _ => (right, true, false),
                 };
-                let status =
-                    unsafe { flexspline_tick(joint.pointer, tables, store.pointer, state.pointer, input, output) };
+                let status = c::flexspline_tick(joint_at, tables, store_at, state_at, input, output) as u32;
                 let objects = store.usable && joint.usable && state.usable;
                 if status == OK {
                     let found = unsafe { right.read() };
