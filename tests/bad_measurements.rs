@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
+use crate::bench_data::{ARCSEC, Bench, RATIO, normal, scaled, shifted};
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
@@ -57,10 +57,6 @@ fn changed(change: impl Fn(&mut Bench)) -> Vec<u8> {
 /// The healthy drive with the lines of its file changed; line 0 is the header.
 fn edited(change: impl Fn(usize, &str) -> String) -> Vec<u8> {
     healthy(ROWS).csv().lines().enumerate().map(|(k, line)| change(k, line)).collect::<String>().into()
-}
-
-fn scaled(values: &mut [f64], by: f64) {
-    values.iter_mut().for_each(|value| *value *= by);
 }
 
 /// Required end of a run over a file.
@@ -159,115 +155,65 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
     let good = healthy(ROWS).csv();
     let rows = |n: usize| good.lines().take(n + 1).collect::<Vec<_>>().join("\n") + "\n";
     let deg = 180.0 / PI;
-    let with_map = |map: &str| format!("data.csv --model nominal.toml --columns {map}");
-    let plain = || "data.csv --model nominal.toml".to_owned();
-    let files: Vec<(&str, String, Vec<u8>, Ends)> = vec![
-        ("sound", plain(), good.clone().into(), Faults(&[])),
-        ("empty", plain(), Vec::new(), Refused(&["data.csv:1: ", "no header"])),
-        ("too few rows to diagnose", plain(), rows(120).into(), Refused(&["data.csv", "120", "200"])),
+    let files: Vec<(&str, Vec<u8>, Ends)> = vec![
+        ("sound", good.clone().into(), Faults(&[])),
+        ("empty", Vec::new(), Refused(&["data.csv:1: ", "no header"])),
+        ("too few rows to diagnose", rows(120).into(), Refused(&["data.csv", "120", "200"])),
         (
             "mixed separators",
-            plain(),
             edited(|k, line| if k > 3000 { line.replace(',', ";") } else { line.to_owned() } + "\n"),
             Refused(&["data.csv:3002: "]),
         ),
-        ("a mapped column that is not there", with_map("generator=psi:rad"), good.clone().into(), Refused(&["psi"])),
-        (
-            "a mapped unit that is none",
-            with_map("generator=generator_rad:grad"),
-            good.clone().into(),
-            Refused(&["--columns", "grad"]),
-        ),
-        (
-            "a mapped quantity that is none",
-            with_map("motor=generator_rad:rad"),
-            good.clone().into(),
-            Refused(&["--columns", "motor"]),
-        ),
-        (
-            "a mapping without columns",
-            with_map("generator"),
-            good.clone().into(),
-            Refused(&["--columns", "\"generator\""]),
-        ),
         (
             "the generator of another drive",
-            plain(),
             changed(|b| {
                 let mut r = fastrand::Rng::with_seed(2);
                 b.generator_rad.iter_mut().for_each(|a| *a = 40.0 * r.f64());
             }),
             Refused(&["data.csv"]),
         ),
-        ("no time", plain(), edited(|_, line| line.split_once(',').unwrap().1.to_owned() + "\n"), Faults(&[])),
-        ("torque in mN.m", plain(), changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1e3)), LeftOut("unit_mismatch")),
-        (
-            "torque in mN.m, said",
-            with_map("torque=torque_n_m:mN.m"),
-            changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1e3)),
-            Faults(&[]),
-        ),
+        ("no time", edited(|_, line| line.split_once(',').unwrap().1.to_owned() + "\n"), Faults(&[])),
+        ("torque in mN.m", changed(|b| scaled(b.torque(), 1e3)), LeftOut("unit_mismatch")),
         (
             "both angles in degrees",
-            plain(),
             changed(|b| {
                 scaled(&mut b.generator_rad, deg);
                 scaled(&mut b.output_rad, deg);
             }),
             Refused(&["angles in degrees", "--columns generator=generator_rad:deg,output=output_rad:deg"]),
         ),
-        (
-            "torque turned round",
-            plain(),
-            changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), -1.0)),
-            Faults(&["torque_sign"]),
-        ),
-        (
-            "torque of the motor",
-            plain(),
-            changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1.0 / RATIO)),
-            Faults(&["torque_scale"]),
-        ),
-        (
-            "torque whose zero is off",
-            plain(),
-            changed(|b| b.torque_n_m.as_mut().unwrap().iter_mut().for_each(|torque| *torque += 0.8)),
-            Faults(&["torque_zero"]),
-        ),
+        ("torque turned round", changed(|b| scaled(b.torque(), -1.0)), Faults(&["torque_sign"])),
+        ("torque of the motor", changed(|b| scaled(b.torque(), 1.0 / RATIO)), Faults(&["torque_scale"])),
+        ("torque whose zero is off", changed(|b| shifted(b.torque(), 0.8)), Faults(&["torque_zero"])),
         (
             "torque in steps of a twentieth of its range",
-            plain(),
-            changed(|b| b.torque_n_m.as_mut().unwrap().iter_mut().for_each(|t| *t = (*t / 1.5).round() * 1.5)),
+            changed(|b| b.torque().iter_mut().for_each(|t| *t = (*t / 1.5).round() * 1.5)),
             Faults(&["quantisation"]),
         ),
         (
             "torque that saturates",
-            plain(),
-            changed(|b| b.torque_n_m.as_mut().unwrap().iter_mut().for_each(|t| *t = t.clamp(-15.0, 15.0))),
+            changed(|b| b.torque().iter_mut().for_each(|t| *t = t.clamp(-15.0, 15.0))),
             Faults(&["frozen_channel"]),
         ),
         (
             "torque of another drive",
-            plain(),
             changed(|b| {
                 let time = b.time_s.clone();
                 let other = |t: f64| 24.0 * (TAU * t / 3.7).sin();
-                b.torque_n_m.as_mut().unwrap().iter_mut().zip(time).for_each(|(torque, t)| *torque = other(t));
+                b.torque().iter_mut().zip(time).for_each(|(torque, t)| *torque = other(t));
             }),
             Unusable("torque_scale"),
         ),
         (
             "a counter that begins anew after a break",
-            plain(),
             changed(|b| {
-                b.time_s[2500..].iter_mut().for_each(|t| *t += 600.0);
-                b.generator_rad[2500..].iter_mut().for_each(|a| *a += 7.0 * TAU);
+                shifted(&mut b.time_s[2500..], 600.0);
+                shifted(&mut b.generator_rad[2500..], 7.0 * TAU);
             }),
             Faults(&["counter_restart"]),
         ),
         (
             "a register of 16 bit that wraps",
-            plain(),
             changed(|b| {
                 b.generator_rad.iter_mut().for_each(|a| *a = (*a + 8.0 * TAU).rem_euclid(16.0 * TAU) - 8.0 * TAU);
             }),
@@ -275,21 +221,19 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
         ),
         (
             "another zero after a break",
-            plain(),
             changed(|b| {
-                b.time_s[2500..].iter_mut().for_each(|t| *t += 600.0);
-                b.output_rad[2500..].iter_mut().for_each(|a| *a += 0.0123);
+                shifted(&mut b.time_s[2500..], 600.0);
+                shifted(&mut b.output_rad[2500..], 0.0123);
             }),
             Faults(&["position_jump"]),
         ),
         (
             "two files joined without a time, the generator within one turn",
-            plain(),
             {
                 let mut bench = healthy(ROWS);
                 let on = 0.4 * TAU * RATIO;
-                bench.generator_rad[3000..].iter_mut().for_each(|a| *a += on);
-                bench.output_rad[3000..].iter_mut().for_each(|a| *a += on / RATIO);
+                shifted(&mut bench.generator_rad[3000..], on);
+                shifted(&mut bench.output_rad[3000..], on / RATIO);
                 bench.generator_rad.iter_mut().for_each(|a| *a = a.rem_euclid(TAU));
                 let without = |line: &str| line.split_once(',').unwrap().1.to_owned() + "\n";
                 bench.csv().lines().map(without).collect::<String>().into()
@@ -298,7 +242,6 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
         ),
         (
             "a logger that stands still after every 50 rows and counts on",
-            plain(),
             edited(|k, line| {
                 let (block, row) = (k / 54, k % 54);
                 if k > 0 && row >= 50 {
@@ -311,7 +254,6 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
         ),
         (
             "time backwards",
-            plain(),
             edited(|k, line| {
                 format!("{line}\n").replacen(
                     &format!("{:.6}", 0.01 * (k as f64 - 1.0)),
@@ -323,7 +265,6 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
         ),
         (
             "spikes in three rows of a hundred",
-            plain(),
             changed(|b| {
                 let mut random = fastrand::Rng::with_seed(8);
                 for k in (5..5990).filter(|_| random.f64() < 0.03).collect::<Vec<_>>() {
@@ -334,18 +275,30 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
         ),
         (
             "a zero that drifts",
-            plain(),
             changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC)),
             Abstains,
         ),
-        ("torque dead", plain(), changed(|b| b.torque_n_m.as_mut().unwrap().fill(0.0)), Abstains),
+        ("torque dead", changed(|b| b.torque().fill(0.0)), Abstains),
+    ];
+    // Wrong mappings, and the right one, of a torque in mN.m.
+    let torque_in_mnm = changed(|b| scaled(b.torque(), 1e3));
+    let mapped = [
+        ("a mapped column that is not there", "generator=psi:rad", Refused(&["psi"])),
+        ("a mapped unit that is none", "generator=generator_rad:grad", Refused(&["--columns", "grad"])),
+        ("a mapped quantity that is none", "motor=generator_rad:rad", Refused(&["--columns", "motor"])),
+        ("a mapping without columns", "generator", Refused(&["--columns", "\"generator\""])),
+        ("torque in mN.m, said", "torque=torque_n_m:mN.m", Faults(&[])),
     ];
     let desk = Desk::new();
     desk.write("nominal.toml", MODEL);
     let (mut cases, mut contents) = (Vec::new(), Vec::new());
-    for (name, options, content, ends) in files {
-        cases.push((name, options, ends));
+    for (name, content, ends) in files {
+        cases.push((name, "data.csv --model nominal.toml".to_owned(), ends));
         contents.push(content);
+    }
+    for (name, columns, ends) in mapped {
+        cases.push((name, format!("data.csv --model nominal.toml --columns {columns}"), ends));
+        contents.push(torque_in_mnm.clone());
     }
     all_judged(&desk, &cases, |k| fs::write(desk.path("data.csv"), &contents[k]).unwrap());
 }

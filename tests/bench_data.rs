@@ -26,10 +26,28 @@ pub fn normal(random: &mut fastrand::Rng) -> f64 {
     (-2.0 * (1.0 - random.f64()).ln()).sqrt() * (TAU * random.f64()).cos()
 }
 
+pub fn shifted(values: &mut [f64], by: f64) {
+    values.iter_mut().for_each(|value| *value += by);
+}
+
+pub fn scaled(values: &mut [f64], by: f64) {
+    values.iter_mut().for_each(|value| *value *= by);
+}
+
 #[allow(dead_code, reason = "each test file uses a part")]
 impl Bench {
     pub fn rows(&self) -> usize {
         self.time_s.len()
+    }
+
+    /// Recorded torques, N·m; a bench without them has no place in the test that asks.
+    pub fn torque(&mut self) -> &mut [f64] {
+        self.torque_n_m.as_mut().expect("torques")
+    }
+
+    /// Recorded temperatures, °C, as [`Self::torque`].
+    pub fn temperature(&mut self) -> &mut [f64] {
+        self.temperature_c.as_mut().expect("temperatures")
     }
 
     /// As a file; rows go through `change`, which may leave fields empty or drop the row.

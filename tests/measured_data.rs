@@ -1,7 +1,7 @@
 //! Measured data, damaged in every way that is known: each file ends in a clear error or in a fault with its name, and
 //! what is physics is not taken for a fault.
 
-use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
+use crate::bench_data::{ARCSEC, Bench, RATIO, normal, scaled, shifted};
 use flexspline_identify::measurement::{ColumnMap, FaultName, Gear, MeasuredError, Recording, Treatment, parse};
 use flexspline_tests::seeds;
 
@@ -124,7 +124,7 @@ use FaultName::{
 };
 
 /// The plain drive with some rows of its file changed: number of the row from 0, its fields.
-fn edited(change: impl Fn(usize, &mut Vec<String>)) -> String {
+fn edited(change: impl Fn(usize, &mut Vec<String>)) -> Vec<u8> {
     let text = Bench::plain(4000, 1.0, 5).csv();
     let mut lines = text.lines();
     let mut edited = format!("{}\n", lines.next().unwrap());
@@ -136,18 +136,38 @@ fn edited(change: impl Fn(usize, &mut Vec<String>)) -> String {
             edited.push('\n');
         }
     }
-    edited
+    edited.into()
+}
+
+/// The plain drive with the fields of line 9 changed.
+fn in_line_9(change: impl Fn(&mut Vec<String>)) -> Vec<u8> {
+    edited(|row, fields| {
+        if row == 7 {
+            change(fields)
+        }
+    })
+}
+
+/// The plain drive with this text in a column of every 400th row.
+fn now_and_then(column: usize, text: &str) -> Vec<u8> {
+    edited(|row, fields| {
+        if row % 400 == 7 {
+            fields[column] = text.into()
+        }
+    })
 }
 
 /// The plain drive with its columns changed.
-fn changed(change: impl Fn(&mut Bench)) -> String {
+fn changed(change: impl Fn(&mut Bench)) -> Vec<u8> {
     let mut bench = Bench::plain(4000, 1.0, 5);
     change(&mut bench);
-    bench.csv()
+    bench.csv().into()
 }
 
-fn scaled(values: &mut [f64], by: f64) {
-    values.iter_mut().for_each(|value| *value *= by);
+/// Rows in which a channel keeps the value that it has in the first of them.
+fn frozen(values: &mut [f64], rows: std::ops::Range<usize>) {
+    let value = values[rows.start];
+    values[rows].fill(value);
 }
 
 #[test]
@@ -160,6 +180,7 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
     let good = Bench::plain(4000, 1.0, 5).csv();
     let header = "time_s,generator_rad,output_rad,torque_n_m,temperature_c\n";
     let rows = |n: usize| good.lines().take(n + 1).collect::<Vec<_>>().join("\n") + "\n";
+    let angles_alone = |line: &str| line.split(',').collect::<Vec<_>>()[1..3].join(",") + "\n";
     let deg = 180.0 / std::f64::consts::PI;
     let cases: Vec<(&str, Vec<u8>, Ends)> = vec![
         // Files that are no table.
@@ -168,36 +189,11 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
         ("header only", header.into(), Error(&["m.csv:1: ", "no rows", "at least 16"])),
         ("one row", rows(1).into(), Error(&["1 row after", "at least 16"])),
         ("two rows", rows(2).into(), Error(&["2 rows after", "at least 16"])),
-        (
-            "no header",
-            good.lines().skip(1).take(50).collect::<Vec<_>>().join("\n").into(),
-            Error(&["first line has numbers"]),
-        ),
         ("binary", (0..=255_u8).cycle().take(4000).collect(), Error(&["binary"])),
-        ("gzip", b"\x1F\x8B\x08\x00abc".to_vec(), Error(&["gzip"])),
-        ("a workbook", b"PK\x03\x04\x14".to_vec(), Error(&["workbook"])),
-        (
-            "UTF-16",
-            good.encode_utf16().fold(vec![0xFF, 0xFE], |mut b, c| {
-                b.extend(c.to_le_bytes());
-                b
-            }),
-            Faults(&[]),
-        ),
         ("header not UTF-8", b"generator_rad,output_rad,\xB0C\n1,2,3\n".to_vec(), Error(&["m.csv:1: ", "1 row after"])),
-        (
-            "prose",
-            b"Measured on Tuesday.\nAll went well.\n".to_vec(),
-            Error(&["column generator_rad is missing", "no rows of numbers"]),
-        ),
         // Columns.
         ("semicolons", good.replace(',', ";").into(), Faults(&[])),
         ("decimal commas", good.replace(',', ";").replace('.', ",").into(), Faults(&[])),
-        (
-            "decimal commas between commas",
-            good.replace('.', ",").into(),
-            Error(&["m.csv:2: ", "fields, but the header has 5", "with a point"]),
-        ),
         ("tabs", good.replace(',', "\t").into(), Faults(&[])),
         (
             "no generator",
@@ -214,88 +210,33 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
             good.replacen("torque_n_m", "generator_rad", 1).into(),
             Error(&["m.csv:1: column generator_rad is there twice"]),
         ),
-        (
-            "a text",
-            edited(|k, f| {
-                if k == 7 {
-                    f[OUTPUT] = "ERR".into()
-                }
-            })
-            .into(),
-            Error(&["m.csv:9: output_rad: found \"ERR\"", "allowed: a number"]),
-        ),
         ("a line of units", good.replacen('\n', "\ns,rad,rad,Nm,degC\n", 1).into(), Faults(&[])),
         (
             "a huge number",
-            edited(|k, f| {
-                if k == 7 {
-                    f[GENERATOR] = "1e300".into()
-                }
-            })
-            .into(),
+            in_line_9(|f| f[GENERATOR] = "1e300".into()),
             Error(&["m.csv:9: generator_rad: found \"1e300\"", "at most 1e9"]),
         ),
-        (
-            "a short row",
-            edited(|k, f| {
-                if k == 7 {
-                    f.truncate(2)
-                }
-            })
-            .into(),
-            Error(&["m.csv:9: 2 fields, but output_rad is field 3"]),
-        ),
-        (
-            "a long row",
-            edited(|k, f| {
-                if k == 7 {
-                    f.push("5.5".into())
-                }
-            })
-            .into(),
-            Error(&["m.csv:9: 6 fields, but the header has 5"]),
-        ),
-        (
-            "two rows in one",
-            edited(|k, f| {
-                if k == 7 {
-                    f.extend(f.clone())
-                }
-            })
-            .into(),
-            Error(&["m.csv:9: 10 fields"]),
-        ),
+        ("a short row", in_line_9(|f| f.truncate(2)), Error(&["m.csv:9: 2 fields, but output_rad is field 3"])),
+        ("a long row", in_line_9(|f| f.push("5.5".into())), Error(&["m.csv:9: 6 fields, but the header has 5"])),
+        ("two rows in one", in_line_9(|f| f.extend(f.clone())), Error(&["m.csv:9: 10 fields"])),
         // Nothing to see.
         (
             "constant",
             changed(|b| {
                 b.generator_rad.fill(1.0);
                 b.output_rad.fill(0.01);
-            })
-            .into(),
+            }),
             Error(&["generator and output keep one value"]),
         ),
-        ("output stands", changed(|b| b.output_rad.fill(0.01)).into(), Error(&["output_rad does not follow"])),
+        ("output stands", changed(|b| b.output_rad.fill(0.01)), Error(&["output_rad does not follow"])),
         (
             "output frozen in most rows",
-            changed(|b| {
-                let value = b.output_rad[1000];
-                b.output_rad[1000..3900].fill(value);
-            })
-            .into(),
+            changed(|b| frozen(&mut b.output_rad, 1000..3900)),
             Error(&["the output keeps one value over 29", "at most half"]),
         ),
-        ("nothing but NaN", edited(|_, f| f[OUTPUT] = "NaN".into()).into(), Error(&["0 rows have all that is needed"])),
-        (
-            "another ratio",
-            changed(|b| scaled(&mut b.output_rad, 7.7)).into(),
-            Error(&["within a factor of 1.25", "ratio"]),
-        ),
-        (
-            "torque of a ship",
-            changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1e6)).into(),
-            Error(&["torque: found", "at most 1e4"]),
-        ),
+        ("nothing but NaN", edited(|_, f| f[OUTPUT] = "NaN".into()), Error(&["0 rows have all that is needed"])),
+        ("another ratio", changed(|b| scaled(&mut b.output_rad, 7.7)), Error(&["within a factor of 1.25", "ratio"])),
+        ("torque of a ship", changed(|b| scaled(b.torque(), 1e6)), Error(&["torque: found", "at most 1e4"])),
         // Harmless.
         (
             "byte order mark, CRLF, comments, quotes",
@@ -305,7 +246,7 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
                 .into(),
             Faults(&[]),
         ),
-        ("commas at the end of rows", edited(|_, f| f.push(String::new())).into(), Faults(&[])),
+        ("commas at the end of rows", edited(|_, f| f.push(String::new())), Faults(&[])),
         (
             "a column of notes in Latin-1",
             {
@@ -318,18 +259,13 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
             },
             Faults(&[]),
         ),
-        (
-            "no time, no torque",
-            edited(|_, f| f.truncate(3)).replace("time_s", "t").replacen(",torque_n_m,temperature_c", "", 1).into(),
-            Faults(&[]),
-        ),
+        ("no time, no torque", good.lines().map(angles_alone).collect::<String>().into(), Faults(&[])),
         (
             "constant temperature and torque",
             changed(|b| {
-                b.torque_n_m.as_mut().unwrap().fill(0.0);
-                b.temperature_c.as_mut().unwrap().fill(20.0);
-            })
-            .into(),
+                b.torque().fill(0.0);
+                b.temperature().fill(20.0);
+            }),
             Faults(&[]),
         ),
         (
@@ -337,52 +273,15 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
             changed(|b| {
                 b.generator_rad.iter_mut().for_each(|a| *a = a.rem_euclid(std::f64::consts::TAU));
                 b.output_rad.iter_mut().for_each(|a| *a = a.rem_euclid(std::f64::consts::TAU));
-            })
-            .into(),
+            }),
             Faults(&[]),
         ),
-        ("a break of a minute", changed(|b| b.time_s[2000..].iter_mut().for_each(|t| *t += 60.0)).into(), Faults(&[])),
+        ("a break of a minute", changed(|b| shifted(&mut b.time_s[2000..], 60.0)), Faults(&[])),
         // Missing.
-        (
-            "NaN",
-            edited(|k, f| {
-                if k % 400 == 7 {
-                    f[OUTPUT] = "NaN".into()
-                }
-            })
-            .into(),
-            Faults(&[MissingSamples]),
-        ),
-        (
-            "inf",
-            edited(|k, f| {
-                if k % 400 == 7 {
-                    f[OUTPUT] = "-inf".into()
-                }
-            })
-            .into(),
-            Faults(&[MissingSamples]),
-        ),
-        (
-            "empty fields",
-            edited(|k, f| {
-                if k % 400 == 7 {
-                    f[TORQUE] = String::new()
-                }
-            })
-            .into(),
-            Faults(&[MissingSamples]),
-        ),
-        (
-            "n/a",
-            edited(|k, f| {
-                if k % 400 == 7 {
-                    f[TEMPERATURE] = "n/a".into()
-                }
-            })
-            .into(),
-            Faults(&[MissingSamples]),
-        ),
+        ("NaN", now_and_then(OUTPUT, "NaN"), Faults(&[MissingSamples])),
+        ("inf", now_and_then(OUTPUT, "-inf"), Faults(&[MissingSamples])),
+        ("empty fields", now_and_then(TORQUE, ""), Faults(&[MissingSamples])),
+        ("n/a", now_and_then(TEMPERATURE, "n/a"), Faults(&[MissingSamples])),
         (
             // Every third row would be a channel that is recorded more slowly.
             "torque missing in most rows, without order",
@@ -390,28 +289,17 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
                 if k * k % 7 > 1 {
                     f[TORQUE] = String::new()
                 }
-            })
-            .into(),
+            }),
             Faults(&[MissingSamples]),
         ),
-        (
-            "time missing here and there",
-            edited(|k, f| {
-                if k % 400 == 7 {
-                    f[TIME] = String::new()
-                }
-            })
-            .into(),
-            Faults(&[MissingSamples]),
-        ),
+        ("time missing here and there", now_and_then(TIME, ""), Faults(&[MissingSamples])),
         (
             "rows lost",
             edited(|k, f| {
                 if k % 400 < 4 {
                     f.clear()
                 }
-            })
-            .into(),
+            }),
             Faults(&[MissingSamples]),
         ),
         ("last line broken off", good[..good.len() - 30].to_owned().into(), Faults(&[MissingSamples])),
@@ -437,58 +325,44 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
             },
             Faults(&[ClockError]),
         ),
-        (
-            "clock set back",
-            changed(|b| b.time_s[2000..].iter_mut().for_each(|t| *t -= 15.0)).into(),
-            Faults(&[ClockError]),
-        ),
-        ("one stamp from another day", changed(|b| b.time_s[2000] += 86_400.0).into(), Faults(&[ClockError])),
-        (
-            "a clock that jumps ahead is a break",
-            changed(|b| b.time_s[2200..].iter_mut().for_each(|t| *t += 5.0)).into(),
-            Faults(&[]),
-        ),
+        ("clock set back", changed(|b| shifted(&mut b.time_s[2000..], -15.0)), Faults(&[ClockError])),
+        ("one stamp from another day", changed(|b| b.time_s[2000] += 86_400.0), Faults(&[ClockError])),
+        ("a clock that jumps ahead is a break", changed(|b| shifted(&mut b.time_s[2200..], 5.0)), Faults(&[])),
         (
             "clock of a fifth of a second",
-            changed(|b| b.time_s.iter_mut().for_each(|t| *t = (*t * 5.0).floor() / 5.0)).into(),
+            changed(|b| b.time_s.iter_mut().for_each(|t| *t = (*t * 5.0).floor() / 5.0)),
             Faults(&[ClockError]),
         ),
         (
             "stamps that jitter",
-            {
+            changed(|b| {
                 let mut random = fastrand::Rng::with_seed(3);
-                let mut bench = Bench::plain(4000, 1.0, 5);
-                bench.time_s.iter_mut().for_each(|t| *t += 0.004 * (random.f64() - 0.5));
-                bench.csv().into()
-            },
+                b.time_s.iter_mut().for_each(|t| *t += 0.004 * (random.f64() - 0.5));
+            }),
             Faults(&[ClockError]),
         ),
-        ("time stands", changed(|b| b.time_s.fill(7.0)).into(), Faults(&[ClockError])),
-        ("time in nanoseconds", changed(|b| scaled(&mut b.time_s, 1e9)).into(), Faults(&[ClockError])),
+        ("time stands", changed(|b| b.time_s.fill(7.0)), Faults(&[ClockError])),
+        ("time in nanoseconds", changed(|b| scaled(&mut b.time_s, 1e9)), Faults(&[ClockError])),
         // Units.
         (
             "generator in degrees",
-            changed(|b| scaled(&mut b.generator_rad, deg)).into(),
+            changed(|b| scaled(&mut b.generator_rad, deg)),
             Error(&["asks for", "--columns generator=generator_rad:deg"]),
         ),
         (
             "generator in turns",
-            changed(|b| scaled(&mut b.generator_rad, deg / 360.0)).into(),
+            changed(|b| scaled(&mut b.generator_rad, deg / 360.0)),
             Error(&["--columns generator=generator_rad:turn"]),
         ),
         (
             "generator wrapped at 360",
-            changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a * deg).rem_euclid(360.0))).into(),
+            changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a * deg).rem_euclid(360.0))),
             Error(&["--columns generator=generator_rad:deg"]),
         ),
-        (
-            "output in degrees",
-            changed(|b| scaled(&mut b.output_rad, deg)).into(),
-            Error(&["--columns output=output_rad:deg"]),
-        ),
+        ("output in degrees", changed(|b| scaled(&mut b.output_rad, deg)), Error(&["--columns output=output_rad:deg"])),
         (
             "output in arc-seconds",
-            changed(|b| scaled(&mut b.output_rad, 1.0 / ARCSEC)).into(),
+            changed(|b| scaled(&mut b.output_rad, 1.0 / ARCSEC)),
             Error(&["--columns output=output_rad:arcsec"]),
         ),
         (
@@ -498,109 +372,63 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
         ),
         (
             "output counts backwards",
-            changed(|b| scaled(&mut b.output_rad, -1.0)).into(),
+            changed(|b| scaled(&mut b.output_rad, -1.0)),
             Error(&["the output counts the other way", "--columns output=output_rad:-rad, or the ratio -95"]),
         ),
-        ("torque in mN.m", changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1e3)).into(), Faults(&[UnitMismatch])),
-        (
-            "temperature in kelvin",
-            changed(|b| b.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15)).into(),
-            Faults(&[UnitMismatch]),
-        ),
+        ("torque in mN.m", changed(|b| scaled(b.torque(), 1e3)), Faults(&[UnitMismatch])),
+        ("temperature in kelvin", changed(|b| shifted(b.temperature(), 273.15)), Faults(&[UnitMismatch])),
         // Encoders.
-        (
-            "an index lost",
-            changed(|b| b.output_rad[1700..].iter_mut().for_each(|a| *a += 53.0 * ARCSEC)).into(),
-            Faults(&[EncoderIndexJump]),
-        ),
+        ("an index lost", changed(|b| shifted(&mut b.output_rad[1700..], 53.0 * ARCSEC)), Faults(&[EncoderIndexJump])),
         (
             "an index lost twice",
             changed(|b| {
-                b.output_rad[900..].iter_mut().for_each(|a| *a -= 31.0 * ARCSEC);
-                b.output_rad[2600..].iter_mut().for_each(|a| *a += 400.0 * ARCSEC);
-            })
-            .into(),
+                shifted(&mut b.output_rad[900..], -31.0 * ARCSEC);
+                shifted(&mut b.output_rad[2600..], 400.0 * ARCSEC);
+            }),
             Faults(&[EncoderIndexJump]),
         ),
         (
             "counts of the generator lost",
-            changed(|b| b.generator_rad[1700..].iter_mut().for_each(|a| *a += 0.03)).into(),
+            changed(|b| shifted(&mut b.generator_rad[1700..], 0.03)),
             Faults(&[EncoderIndexJump]),
         ),
-        (
-            "output frozen",
-            changed(|b| {
-                let value = b.output_rad[1500];
-                b.output_rad[1500..1620].fill(value);
-            })
-            .into(),
-            Faults(&[FrozenChannel]),
-        ),
-        (
-            "generator frozen",
-            changed(|b| {
-                let value = b.generator_rad[600];
-                b.generator_rad[600..720].fill(value);
-            })
-            .into(),
-            Faults(&[FrozenChannel]),
-        ),
-        (
-            "torque frozen",
-            changed(|b| {
-                let torque = b.torque_n_m.as_mut().unwrap();
-                let value = torque[1500];
-                torque[1500..1800].fill(value);
-            })
-            .into(),
-            Faults(&[FrozenChannel]),
-        ),
-        (
-            "temperature frozen",
-            changed(|b| {
-                let temperature = b.temperature_c.as_mut().unwrap();
-                let value = temperature[1500];
-                temperature[1500..1800].fill(value);
-            })
-            .into(),
-            Faults(&[FrozenChannel]),
-        ),
+        ("output frozen", changed(|b| frozen(&mut b.output_rad, 1500..1620)), Faults(&[FrozenChannel])),
+        ("generator frozen", changed(|b| frozen(&mut b.generator_rad, 600..720)), Faults(&[FrozenChannel])),
+        ("torque frozen", changed(|b| frozen(b.torque(), 1500..1800)), Faults(&[FrozenChannel])),
+        ("temperature frozen", changed(|b| frozen(b.temperature(), 1500..1800)), Faults(&[FrozenChannel])),
         (
             "spikes of the output",
-            changed(|b| (100..3900).step_by(331).for_each(|k| b.output_rad[k] += 60.0 * ARCSEC)).into(),
+            changed(|b| (100..3900).step_by(331).for_each(|k| b.output_rad[k] += 60.0 * ARCSEC)),
             Faults(&[Outliers]),
         ),
         (
             "spikes of the torque",
-            changed(|b| (100..3900).step_by(331).for_each(|k| b.torque_n_m.as_mut().unwrap()[k] += 25.0)).into(),
+            changed(|b| (100..3900).step_by(331).for_each(|k| b.torque()[k] += 25.0)),
             Faults(&[Outliers]),
         ),
         (
             "a coarse output encoder",
-            changed(|b| b.output_rad.iter_mut().for_each(|a| *a = (*a / (12.0 * ARCSEC)).round() * 12.0 * ARCSEC))
-                .into(),
+            changed(|b| b.output_rad.iter_mut().for_each(|a| *a = (*a / (12.0 * ARCSEC)).round() * 12.0 * ARCSEC)),
             Faults(&[Quantisation]),
         ),
         (
             "a coarse generator encoder",
-            changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a / 0.005).round() * 0.005)).into(),
+            changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a / 0.005).round() * 0.005)),
             Faults(&[Quantisation]),
         ),
         (
             "a zero that drifts",
-            changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC)).into(),
+            changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC)),
             Faults(&[Drift]),
         ),
         // Two at once.
         (
             "NaN, an index lost, kelvin",
-            {
-                let mut bench = Bench::plain(4000, 1.0, 5);
-                bench.output_rad[1700..].iter_mut().for_each(|a| *a += 53.0 * ARCSEC);
-                bench.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15);
-                bench.output_rad[77] = f64::NAN;
-                bench.csv().into()
-            },
+            changed(|b| {
+                shifted(&mut b.output_rad[1700..], 53.0 * ARCSEC);
+                shifted(b.temperature(), 273.15);
+                b.output_rad[77] = f64::NAN;
+            }),
             Faults(&[EncoderIndexJump, MissingSamples, UnitMismatch]),
         ),
     ];
@@ -635,7 +463,7 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
     let clean = read(Bench::plain(4000, 1.0, 5).csv().as_bytes()).unwrap();
     let clean = &clean.sessions[0];
     // An index jump: where, how large, and gone.
-    let jump = read(changed(|b| b.output_rad[1700..].iter_mut().for_each(|a| *a += 53.0 * ARCSEC)).as_bytes()).unwrap();
+    let jump = read(&changed(|b| shifted(&mut b.output_rad[1700..], 53.0 * ARCSEC))).unwrap();
     let fault = &jump.faults[0];
     assert_eq!((fault.first_line, fault.treatment), (1702, Treatment::Repaired));
     assert!(
@@ -650,11 +478,11 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
     for (name, text) in [
         (
             "exchanged",
-            Bench::plain(4000, 1.0, 5).csv().replacen("generator_rad,output_rad", "output_rad,generator_rad", 1),
+            Bench::plain(4000, 1.0, 5).csv().replacen("generator_rad,output_rad", "output_rad,generator_rad", 1).into(),
         ),
         ("wrapped", changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = a.rem_euclid(std::f64::consts::TAU)))),
     ] {
-        let session = &read(text.as_bytes()).unwrap().sessions[0];
+        let session = &read(&text).unwrap().sessions[0];
         for row in [0, 1234, 3999] {
             assert!((session.generator_rad[row] - clean.generator_rad[row]).abs() < 1e-6, "{name}");
             assert!((session.error_rad[row] - clean.error_rad[row]).abs() < 0.01 * ARCSEC, "{name}");
@@ -664,23 +492,15 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
         }
     }
     // What its size alone says of a unit converts nothing: the column is left out, and all else is as it was.
-    let kelvin = changed(|b| b.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15));
-    let kelvin = read(kelvin.as_bytes()).unwrap();
+    let kelvin = read(&changed(|b| shifted(b.temperature(), 273.15))).unwrap();
     assert!(kelvin.sessions[0].temperature_c.is_none() && kelvin.sessions[0].error_rad == clean.error_rad);
     assert!(kelvin.faults[0].what.contains("temperature=temperature_c:K"), "{:?}", kelvin.faults);
     // A drift: its size, and gone.
     let text = changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC));
-    let fault = &read(text.as_bytes()).unwrap().faults[0];
+    let fault = &read(&text).unwrap().faults[0];
     assert!((fault.size_arcsec.unwrap() - 32.0).abs() < 4.0, "{fault:?}");
     // Frozen rows are left out, by their lines.
-    let frozen = read(
-        changed(|b| {
-            let value = b.output_rad[1500];
-            b.output_rad[1500..1620].fill(value);
-        })
-        .as_bytes(),
-    )
-    .unwrap();
+    let frozen = read(&changed(|b| frozen(&mut b.output_rad, 1500..1620))).unwrap();
     assert_eq!((frozen.faults[0].first_line, frozen.faults[0].rows, frozen.sessions[0].len()), (1502, 120, 3880));
     assert_eq!(frozen.sessions[0].line[1500], 1622);
 }
@@ -688,8 +508,8 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
 #[test]
 fn a_drive_that_ratchets_is_the_drive_and_not_an_encoder() {
     let pitch = std::f64::consts::TAU / 190.0;
-    let text = changed(|b| b.output_rad[1700..].iter_mut().for_each(|a| *a -= 2.0 * pitch));
-    let read = read(text.as_bytes()).unwrap();
+    let text = changed(|b| shifted(&mut b.output_rad[1700..], -2.0 * pitch));
+    let read = read(&text).unwrap();
     assert_eq!(names(&read), []);
     assert_eq!(read.tooth_steps.len(), 1, "{:?}", read.notes);
     let step = &read.tooth_steps[0];
@@ -707,7 +527,7 @@ fn teeth_that_slide_twice_are_no_drift_of_the_zero() {
             b.output_rad[k] -= slide(k.saturating_sub(1500)) + slide(k.saturating_sub(2500));
         }
     });
-    let read = read(text.as_bytes()).unwrap();
+    let read = read(&text).unwrap();
     assert_eq!(names(&read), []);
     let left = read.sessions[0].error_rad[3900] - read.sessions[0].error_rad[100];
     assert!((left + 2.0 * pitch).abs() < 100.0 * ARCSEC, "both are still there");
@@ -722,7 +542,7 @@ fn teeth_that_slip_between_two_recordings_are_no_drift_of_the_zero() {
             b.output_rad[k] -= if k >= 1600 { 2.0 * pitch } else { 0.0 };
         }
     });
-    let read = read(text.as_bytes()).unwrap();
+    let read = read(&text).unwrap();
     assert_eq!(names(&read), []);
     let left = read.sessions[9].error_rad[200] - read.sessions[0].error_rad[200];
     assert!((left + 2.0 * pitch).abs() < 100.0 * ARCSEC, "the slip is still there: {left}");
@@ -749,15 +569,15 @@ fn a_generator_that_turns_half_way_round_between_rows_is_counted_by_the_output()
 #[test]
 fn sessions_of_one_row_and_of_many_are_kept_apart() {
     let text = changed(|b| {
-        b.time_s[1000..].iter_mut().for_each(|t| *t += 60.0);
-        b.time_s[1001..].iter_mut().for_each(|t| *t += 60.0);
+        shifted(&mut b.time_s[1000..], 60.0);
+        shifted(&mut b.time_s[1001..], 60.0);
         // Ten periods are no gap, eleven are.
-        b.time_s[2000..].iter_mut().for_each(|t| *t += 0.089);
-        b.time_s[3000..].iter_mut().for_each(|t| *t += 0.095);
-        b.generator_rad[3000..].iter_mut().for_each(|t| *t += 0.5);
-        b.output_rad[3000..].iter_mut().for_each(|t| *t += 0.5 / RATIO);
+        shifted(&mut b.time_s[2000..], 0.089);
+        shifted(&mut b.time_s[3000..], 0.095);
+        shifted(&mut b.generator_rad[3000..], 0.5);
+        shifted(&mut b.output_rad[3000..], 0.5 / RATIO);
     });
-    let read = read(text.as_bytes()).unwrap();
+    let read = read(&text).unwrap();
     let lengths: Vec<usize> = read.sessions.iter().map(|session| session.len()).collect();
     assert_eq!(lengths, [1000, 1, 1999, 1000]);
     assert_eq!(read.sessions[2].line[0], 1003);

@@ -498,33 +498,6 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_file_is_refused_by_line_field_and_value() {
-        for (from, to, message) in [
-            ("= 190", "= 187", "n.toml:3: drive.circular_spline_teeth: found 187, allowed: 189 to 200"),
-            ("= 60.0", "= -1.0", "n.toml:7: nominal.backlash_arcsec: found -1, allowed: 0 to 100000"),
-            ("= 60.0", "= nan", "n.toml:7: nominal.backlash_arcsec: found NaN"),
-            ("= 60.0", "= \"wide\"", "n.toml:7: nominal.backlash_arcsec: found \"wide\", allowed: 0 to 100000"),
-            ("friction_torque_n_m", "friktion", "n.toml:8: nominal.friktion: unknown key; allowed: stiffness"),
-            (
-                "\"flexspline\"",
-                "\"ring\"",
-                "n.toml:4: drive.fixed: found \"ring\", allowed: \"flexspline\", \"circular_spline\"",
-            ),
-            ("[10.0, 40000.0]", "[-1.0, 40000.0]", "n.toml:6: nominal.stiffness_n_m_per_rad: found"),
-            (
-                "amplitude_arcsec = 10.0",
-                "amplitude_arcsec = inf",
-                "n.toml:11: nominal.harmonic[0].amplitude_arcsec: found inf",
-            ),
-            ("circular_spline_teeth = 190\n", "", "n.toml: drive: expected flexspline_teeth and circular_spline_teeth"),
-        ] {
-            let text = TEXT.replacen(from, to, 1);
-            let error = Nominal::from_toml("n.toml", &text).unwrap_err().to_string();
-            assert!(error.starts_with(message), "{to}: {error}");
-        }
-    }
-
-    #[test]
     fn the_template_is_read_back_as_it_stands() {
         let text = Nominal::template(188, 190);
         let nominal = Nominal::from_toml("n.toml", &text).unwrap();
@@ -548,27 +521,6 @@ mod tests {
     fn misspelt_keys_get_a_suggestion_all_at_once_and_garbage_gets_none() {
         for (from, to, message) in [
             ("[drive]", "[Drive]", "n.toml:1: Drive: unknown key; did you mean `drive`?; allowed: drive, nominal"),
-            ("[nominal]", "[nominel]", "n.toml:5: nominel: unknown key; did you mean `nominal`?"),
-            (
-                "flexspline_teeth",
-                "flexspline_tooth",
-                "n.toml:2: drive.flexspline_tooth: unknown key; did you mean `drive.flexspline_teeth`?",
-            ),
-            (
-                "backlash_arcsec",
-                "backlash",
-                "n.toml:7: nominal.backlash: unknown key; did you mean `nominal.backlash_arcsec`?",
-            ),
-            (
-                "backlash_arcsec",
-                "backlash_arcmin",
-                "n.toml:7: nominal.backlash_arcmin: unknown key; did you mean `nominal.backlash_arcsec`?",
-            ),
-            (
-                "[[nominal.harmonic]]",
-                "[[nominal.harmonics]]",
-                "n.toml:9: nominal.harmonics: unknown key; did you mean `nominal.harmonic`?",
-            ),
             (
                 "phase_rad",
                 "phase_deg",
