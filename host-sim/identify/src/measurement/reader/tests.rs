@@ -52,12 +52,18 @@ fn with(place: usize, of: impl Fn(usize, &str) -> String) -> impl Fn(usize) -> V
     }
 }
 
+/// The bytes of a [`file`].
+fn log(above: &str, separator: &str, fields: impl Fn(usize) -> Vec<String>) -> Vec<u8> {
+    file(above, separator, fields).into_bytes()
+}
+
 /// A file: what stands above, and rows.
 fn file(above: &str, separator: &str, fields: impl Fn(usize) -> Vec<String>) -> String {
     (0..ROWS).fold(above.to_owned(), |text, k| text + &fields(k).join(separator) + "\n")
 }
 
 const NAMES: &str = "time_s,motor_deg,joint_deg,torque_Nm\n";
+const TIMED: &str = "Time,Motor (deg),Joint (deg),Torque (Nm)\n";
 
 fn csv() -> String {
     file(NAMES, ",", plain)
@@ -116,8 +122,20 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         let units = mark.then_some(0xFEFF).into_iter().chain(text.encode_utf16());
         units.flat_map(|unit| if little { unit.to_le_bytes() } else { unit.to_be_bytes() }).collect()
     };
-    let lines = |text: String, change: &dyn Fn(Vec<String>) -> Vec<String>| -> Vec<u8> {
-        change(text.lines().map(str::to_owned).collect()).join("\n").into_bytes()
+    let lines = |text: String, change: &dyn Fn(&mut Vec<String>)| -> Vec<u8> {
+        let mut all: Vec<String> = text.lines().map(str::to_owned).collect();
+        change(&mut all);
+        all.join("\n").into_bytes()
+    };
+    // The file whose rows have a column changed.
+    let column = |place: usize, of: fn(usize, &str) -> String| log(NAMES, ",", with(place, of));
+    // Time in whole seconds and in parts of a second.
+    let parted = |unit: &str, parts: u64| {
+        log(&format!("time_s,time_{unit},motor_deg,joint_deg,torque_Nm\n"), ",", |k| {
+            let time = parts / 20 * k as u64;
+            [vec![(1_700_000_000 + time / parts).to_string(), (time % parts).to_string()], plain(k)[1..].to_vec()]
+                .concat()
+        })
     };
     let german = "Zeit;Motorwinkel;Abtriebswinkel;Moment\ns;deg;deg;N.m\n";
     let scope = |own: f64| {
@@ -175,13 +193,12 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         text
     };
     let reordered = |line: usize, header: &str| {
-        lines(csv(), &|mut all| {
+        lines(csv(), &|all| {
             for row in &mut all[line..] {
                 let fields: Vec<&str> = row.split(',').collect();
                 *row = [fields[0], fields[3], fields[1], fields[2]].join(",");
             }
             all.insert(line, header.to_owned());
-            all
         })
     };
     let holes = |from: usize, zeros: usize| {
@@ -204,38 +221,32 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         // Headers.
         (
             "names, units, objects",
-            file(&format!("{german};axis-3;axis-3;axis-3\n"), ";", decimal_commas).into(),
+            log(&format!("{german};axis-3;axis-3;axis-3\n"), ";", decimal_commas),
             Read(ROWS, "neither names nor units"),
         ),
         (
             "names, objects, units",
-            file("Zeit;Motor;Abtrieb;Moment\nMP 1;MP 2;MP 3;MP 4\ns;deg;deg;Nm\n", ";", decimal_commas).into(),
+            log("Zeit;Motor;Abtrieb;Moment\nMP 1;MP 2;MP 3;MP 4\ns;deg;deg;Nm\n", ";", decimal_commas),
             Read(ROWS, ""),
         ),
         (
             "objects above names and units",
-            file("Bench 4;left;left;left\nZeit;Motor;Abtrieb;Moment\ns;deg;deg;Nm\n", ";", decimal_commas).into(),
+            log("Bench 4;left;left;left\nZeit;Motor;Abtrieb;Moment\ns;deg;deg;Nm\n", ";", decimal_commas),
             Read(ROWS, ""),
         ),
         (
             "settings below the names",
-            file(&format!("{NAMES}Scale,1,1,1\nOffset,0,0,0\n"), ",", plain).into(),
+            log(&format!("{NAMES}Scale,1,1,1\nOffset,0,0,0\n"), ",", plain),
             Read(ROWS, "Scale"),
         ),
         ("a scope, one clock", scope(0.0).into(), Refused("a time column of its own")),
         ("a scope, a clock for each channel", scope(0.011).into(), Refused("pd.merge_asof")),
         (
             "a time before each channel",
-            file("time1,motor_deg,time2,joint_deg\n", ",", |k| {
-                let t = STEP_S * k as f64;
-                vec![
-                    format!("{t:.3}"),
-                    format!("{:.5}", motor(t)),
-                    format!("{:.3}", t + 0.02),
-                    format!("{:.8}", joint(t + 0.02)),
-                ]
-            })
-            .into(),
+            log("time1,motor_deg,time2,joint_deg\n", ",", |k| {
+                let t = STEP_S * k as f64 + 0.02;
+                [plain(k)[..2].to_vec(), vec![format!("{t:.3}"), format!("{:.8}", joint(t))]].concat()
+            }),
             Refused("a time column of its own"),
         ),
         // Lines that are no rows.
@@ -259,239 +270,149 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         ),
         (
             "a preamble and the names once more",
-            lines(csv(), &|mut all| {
+            lines(csv(), &|all| {
                 all.splice(301..301, ["Logger started anew".to_owned(), NAMES.trim().to_owned()]);
-                all
             }),
             Read(ROWS, "repeated once"),
         ),
         ("other names midway", reordered(301, "hour,left,right,up"), Refused("second line of names")),
         // Times.
-        (
-            "AM and PM",
-            file(
-                "Time,Motor (deg),Joint (deg),Torque (Nm)\n",
-                ",",
-                with(0, |k, _| format!("05/04/2025 {}", half_day(43_190.0, k))),
-            )
-            .into(),
-            Read(ROWS, ""),
-        ),
+        ("AM and PM", log(TIMED, ",", with(0, |k, _| format!("05/04/2025 {}", half_day(43_190.0, k)))), Read(ROWS, "")),
         (
             "AM and PM, no date",
-            file("Time;Motor (deg);Joint (deg);Torque (Nm)\n", ";", with(0, |k, _| half_day(43_190.0, k))).into(),
+            log("Time;Motor (deg);Joint (deg);Torque (Nm)\n", ";", with(0, |k, _| half_day(43_190.0, k))),
             Read(ROWS, ""),
         ),
         (
             "date, clock and half of the day apart",
-            file("Date Time Half Motor Joint Torque\n", " ", |k| {
+            log("Date Time Half Motor Joint Torque\n", " ", |k| {
                 let half = half_day(43_190.0, k);
                 [vec!["05/04/2025".to_owned(), half], plain(k)[1..].to_vec()].concat()
-            })
-            .into(),
+            }),
             Read(ROWS, "pd.to_datetime"),
         ),
         (
             "date and clock apart",
-            file("Date,Time,Motor (deg),Joint (deg),Torque (Nm)\n", ",", |k| {
+            log("Date,Time,Motor (deg),Joint (deg),Torque (Nm)\n", ",", |k| {
                 [vec!["2025-05-04".to_owned(), clock(50_000.0, k)], plain(k)[1..].to_vec()].concat()
-            })
-            .into(),
+            }),
             Read(ROWS, "pd.to_datetime"),
         ),
         (
             "across midnight with a date apart",
-            file("Date,Time,Motor (deg),Joint (deg),Torque (Nm)\n", ",", |k| {
+            log("Date,Time,Motor (deg),Joint (deg),Torque (Nm)\n", ",", |k| {
                 let date = if STEP_S * (k as f64) < 10.0 { "31.12.2025" } else { "01.01.2026" };
                 [vec![date.to_owned(), clock(86_390.0, k)], plain(k)[1..].to_vec()].concat()
-            })
-            .into(),
+            }),
             Read(ROWS, "pd.to_datetime"),
         ),
         (
             "names of months",
-            file(
-                "Time,Motor (deg),Joint (deg),Torque (Nm)\n",
-                ",",
-                with(0, |k, _| format!("25-May-2025 {}", clock(50_000.0, k))),
-            )
-            .into(),
+            log(TIMED, ",", with(0, |k, _| format!("25-May-2025 {}", clock(50_000.0, k)))),
             Read(ROWS, ""),
         ),
         (
             "days of a spreadsheet",
-            file(
+            log(
                 NAMES.replace("time_s", "Time").as_str(),
                 ",",
                 with(0, |k, _| format!("{:.10}", 45_781.5 + STEP_S * k as f64 / 86_400.0)),
-            )
-            .into(),
+            ),
             Read(ROWS, ""),
         ),
         (
             "days of a spreadsheet, decimal commas",
-            file("Zeit;Motor;Abtrieb;Moment\n", ";", |k| {
+            log("Zeit;Motor;Abtrieb;Moment\n", ";", |k| {
                 let mut fields = decimal_commas(k);
                 fields[0] = format!("{:.10}", 45_781.5 + STEP_S * k as f64 / 86_400.0).replace('.', ",");
                 fields
-            })
-            .into(),
+            }),
             Read(ROWS, ""),
         ),
-        (
-            "seconds and nanoseconds",
-            file("time_s,time_ns,motor_deg,joint_deg,torque_Nm\n", ",", |k| {
-                let ns = 50_000_000 * k as u64;
-                [
-                    vec![(1_700_000_000 + ns / 1_000_000_000).to_string(), (ns % 1_000_000_000).to_string()],
-                    plain(k)[1..].to_vec(),
-                ]
-                .concat()
-            })
-            .into(),
-            Blocked("df[SECONDS] + df[PARTS] / 1e9"),
-        ),
-        (
-            "seconds and microseconds",
-            file("time_s,time_us,motor_deg,joint_deg,torque_Nm\n", ",", |k| {
-                let us = 50_000 * k as u64;
-                [
-                    vec![(1_700_000_000 + us / 1_000_000).to_string(), (us % 1_000_000).to_string()],
-                    plain(k)[1..].to_vec(),
-                ]
-                .concat()
-            })
-            .into(),
-            Blocked("df[SECONDS] + df[PARTS] / 1e6"),
-        ),
-        (
-            "newest first",
-            lines(csv(), &|mut all| {
-                all[1..].reverse();
-                all
-            }),
-            Read(ROWS, "turned round"),
-        ),
+        ("seconds and nanoseconds", parted("ns", 1_000_000_000), Blocked("df[SECONDS] + df[PARTS] / 1e9")),
+        ("seconds and microseconds", parted("us", 1_000_000), Blocked("df[SECONDS] + df[PARTS] / 1e6")),
+        ("newest first", lines(csv(), &|all| all[1..].reverse()), Read(ROWS, "turned round")),
         (
             "newest first, dates",
-            lines(
-                file(
-                    "Time,Motor (deg),Joint (deg),Torque (Nm)\n",
-                    ",",
-                    with(0, |k, _| format!("2025-05-04 {}", clock(5e4, k))),
-                ),
-                &|mut all| {
-                    all[1..].reverse();
-                    all
-                },
-            ),
+            lines(file(TIMED, ",", with(0, |k, _| format!("2025-05-04 {}", clock(5e4, k)))), &|all| all[1..].reverse()),
             Read(ROWS, "turned round"),
         ),
         (
             "unsorted",
-            lines(csv(), &|mut all| {
-                all[1..].chunks_mut(3).for_each(|some| some.rotate_left(1));
-                all
-            }),
+            lines(csv(), &|all| all[1..].chunks_mut(3).for_each(|some| some.rotate_left(1))),
             Read(ROWS, "sorted"),
         ),
         (
             "each row twice",
-            lines(csv(), &|all| {
-                all.iter()
-                    .enumerate()
-                    .flat_map(|(k, line)| std::iter::repeat_n(line.clone(), if k == 0 { 1 } else { 2 }))
-                    .collect()
-            }),
+            lines(csv(), &|all| *all = all.iter().flat_map(|line| [line.clone(), line.clone()]).skip(1).collect()),
             Read(ROWS, "repeat the row before"),
         ),
         // Numbers.
         (
             "thousands in quotes",
-            file(NAMES, ",", with(1, |_, text| format!("\"{}\"", grouped(text, ",", ".")))).into(),
+            column(1, |_, text| format!("\"{}\"", grouped(text, ",", "."))),
             Blocked("found \"1,008.00000\" (376 more in this column)"),
         ),
         (
             "thousands behind apostrophes",
-            file(NAMES, ",", with(1, |_, text| grouped(text, "'", "."))).into(),
+            column(1, |_, text| grouped(text, "'", ".")),
             Blocked("found \"1'008.00000\""),
         ),
         (
             "decimal commas, comma and blank between",
-            file("time_s, motor_deg, joint_deg, torque_Nm\n", ", ", decimal_commas).into(),
+            log("time_s, motor_deg, joint_deg, torque_Nm\n", ", ", decimal_commas),
             Refused("with a point, not with a comma"),
         ),
-        (
-            "decimal commas between commas",
-            file(NAMES, ",", decimal_commas).into(),
-            Refused("with a point, not with a comma"),
-        ),
+        ("decimal commas between commas", log(NAMES, ",", decimal_commas), Refused("with a point, not with a comma")),
         (
             "Fortran",
-            file("  time_s  motor_deg joint_deg torque_Nm\n", "  ", |k| {
+            log("  time_s  motor_deg joint_deg torque_Nm\n", "  ", |k| {
                 plain(k).iter().map(|f| format!("{f}D+00")).collect()
-            })
-            .into(),
+            }),
             Refused("no rows of numbers"),
         ),
-        (
-            "a true minus",
-            file(NAMES, ",", with(3, |_, text| text.replace('-', "\u{2212}"))).into(),
-            Blocked("found \"\u{2212}"),
-        ),
+        ("a true minus", column(3, |_, text| text.replace('-', "\u{2212}")), Blocked("found \"\u{2212}")),
         (
             "units in cells",
-            file(NAMES, ",", |k| {
+            log(NAMES, ",", |k| {
                 plain(k).iter().zip(["s", "deg", "deg", "N.m"]).map(|(f, unit)| format!("{f} {unit}")).collect()
-            })
-            .into(),
+            }),
             Refused("found \"0."),
         ),
         (
             "beyond the range",
-            file(
-                NAMES,
-                ",",
-                with(3, |k, text| match k % 100 {
-                    5 => "OVER".into(),
-                    8 => "+9.9E+37".into(),
-                    _ => text.into(),
-                }),
-            )
-            .into(),
+            column(3, |k, text| match k % 100 {
+                5 => "OVER".into(),
+                8 => "+9.9E+37".into(),
+                _ => text.into(),
+            }),
             Read(ROWS, "beyond the range"),
         ),
         (
             "beyond the range, an angle",
-            file(NAMES, ",", with(2, |k, text| if k == 77 { "-OL".into() } else { text.into() })).into(),
+            column(2, |k, text| if k == 77 { "-OL".into() } else { text.into() }),
             Read(ROWS - 1, "beyond the range"),
         ),
-        (
-            "a word",
-            file(NAMES, ",", with(2, |k, text| if k == 77 { "high".into() } else { text.into() })).into(),
-            Blocked("found \"high\""),
-        ),
+        ("a word", column(2, |k, text| if k == 77 { "high".into() } else { text.into() }), Blocked("found \"high\"")),
         (
             "words for the torque",
-            file(NAMES, ",", with(3, |k, text| if k % 50 == 7 { "err".into() } else { text.into() })).into(),
+            column(3, |k, text| if k % 50 == 7 { "err".into() } else { text.into() }),
             Blocked("found \"err\" (11 more in this column)"),
         ),
         // Names that are not those of the columns.
         (
             "one name less than columns, as R writes names of rows",
-            file("\"time_s\" \"motor_deg\" \"joint_deg\" \"torque_Nm\"\n", " ", |k| {
+            log("\"time_s\" \"motor_deg\" \"joint_deg\" \"torque_Nm\"\n", " ", |k| {
                 [vec![format!("\"{}\"", k + 1)], plain(k)].concat()
-            })
-            .into(),
+            }),
             Refused("5 fields, but the header has 4; each column has a name"),
         ),
         (
             "decimal commas between commas, zeros at the end cut",
-            file(NAMES, ",", |k| {
+            log(NAMES, ",", |k| {
                 let cut = |f: &String| f.trim_end_matches('0').trim_end_matches('.').replace('.', ",");
                 plain(k).iter().map(cut).collect()
-            })
-            .into(),
+            }),
             Refused("with a point, not with a comma"),
         ),
         (
@@ -501,15 +422,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         ),
         // Zero bytes.
         ("a hole of zeros", holes(9000, 512), Read(ROWS - 1, "zero bytes stand in 1 line")),
-        (
-            "zeros at the end",
-            {
-                let mut bytes = csv().into_bytes();
-                bytes.extend([0; 5000]);
-                bytes
-            },
-            Read(ROWS, "zero bytes stand in 1 line"),
-        ),
+        ("zeros at the end", [csv().as_bytes(), &[0; 5000]].concat(), Read(ROWS, "zero bytes stand in 1 line")),
         // Rows.
         ("each channel at its own instants", own_stamps.into(), Blocked("never recorded in one row")),
         (
