@@ -137,28 +137,4 @@ mod tests {
         assert_eq!(read[0].generator_rad, 0.95);
         assert_eq!(read[0].output_rad, 0.01);
     }
-
-    #[test]
-    fn wrong_files_are_refused_each_with_its_own_message() {
-        let header = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n";
-        for (text, message) in [
-            (String::new(), "column generator_rad is missing"),
-            ("generator_rad,torque_n_m,temperature_c,output_rad\n0,0,20,0\n".to_owned(), "column direction is missing"),
-            (format!("output_rad,{header}"), "column output_rad is there twice"),
-            (header.to_owned(), "no samples"),
-            (format!("{header}0,0,20,1\n"), "line 2: 4 fields, but output_rad is field 5"),
-            (format!("{header}0,0,20,1,0\n0,x,20,1,0\n"), "line 3: torque_n_m is \"x\", not a number"),
-            (format!("{header}0,0,20,1,NaN\n"), "line 2: output_rad is NaN; a finite number"),
-            (format!("{header}0,0,inf,1,0\n"), "line 2: temperature_c is inf"),
-            (format!("{header}0,0,20,0,0\n"), "line 2: direction is 0; allowed are 1 and -1"),
-            (format!("{header}0,0,20,1,2e7\n"), "line 2: output_rad is 20000000 rad; at most 1e6 rad"),
-            (format!("{header}0,0,5000,1,0\n"), "line 2: temperature_c is 5000 °C"),
-            (format!("{header}0,0,,1,0\n"), "line 2: temperature_c is \"\", not a number"),
-            (header.replace(',', ";"), "column generator_rad is missing"),
-        ] {
-            let error = parse("s.csv", text.as_bytes()).unwrap_err().to_string();
-            assert!(error.starts_with("s.csv: ") && error.contains(message), "{text:?} gave {error:?}");
-        }
-        assert!(parse("s.csv", b"generator_rad,\xff\n").is_err());
-    }
 }
