@@ -89,27 +89,6 @@ fn at_a_constant_rate_the_ripple_is_a_fifth_and_that_of_wind_stays() {
     }
 }
 
-/// Loads about zero, by the maps of all generators.
-#[test]
-#[ignore = "long: tests/run slow"]
-fn about_zero_load_the_core_gains_with_every_generator() {
-    for kind in GeneratorKind::ALL {
-        for (torque, noise, load) in [("on_load", 0.3, 0.3), ("in_mesh", 0.03, 0.0), ("current", 0.0, 0.0)] {
-            let text = format!(
-                "base = \"antenna\"\ngenerator = \"{kind}\"\ntorque = \"{torque}\"\ntorque_noise_n_m = {noise}\nlegs \
-                 = [[2.0, 0.0], [2.0, 0.005], [2.0, -0.001], [2.0, 0.0001]]\n[load]\nbias_n_m = {load}\nswing = [0.0, \
-                 0.05]\ngust = [0.0, 0.3]\n"
-            );
-            let rms = flight(&read("light.toml", &text).unwrap()).rms_arcsec;
-            println!(
-                "{kind}, {torque}, load {load}: {:.2} none, {:.2} core, {:.2} ideal",
-                rms.none, rms.compensated, rms.ideal
-            );
-            assert!(rms.compensated < 0.5 * rms.none, "{kind} {torque}: {rms:?}");
-        }
-    }
-}
-
 /// A correction that crosses the play moves the torque in the mesh. Before that had to settle, the flank changed over
 /// and over here: 52″ and 64″ for 32 without, 1043 and 1742″/s; now 18 and 23″, 282 and 475″/s.
 #[test]
@@ -145,7 +124,10 @@ fn the_bound_of_the_torque_holds_where_the_motor_sticks_and_in_the_cold() {
 fn the_bound_of_the_torque_by_the_motors_current_holds() {
     for kind in GeneratorKind::ALL {
         let found = flight(&dish(kind, "current"));
+        let unknown = flight(&dish(kind, "none")).removed.unwrap();
         println!("{kind}: removed {:.3}, within {:.3}", found.removed.unwrap(), found.torque_within_bound.unwrap());
+        // The cam's wind-up is nearly straight: the mean of the load shows as much.
+        assert!(kind == GeneratorKind::Cam || found.removed.unwrap() > unknown, "{kind}: {unknown} without a torque");
         assert!(found.torque_within_bound.unwrap() > 0.95 && found.removed.unwrap() > 0.75 && found.stable, "{kind}");
     }
 }

@@ -2,56 +2,15 @@
 
 use flexspline::{Drive, FixedMember};
 use flexspline_motion::dish::{self, scenario};
-use flexspline_motion::flight::{COMPENSATED, CONTROLLERS, Flight, Flown, JointUnit, fly, fly_one};
-use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
+use flexspline_motion::flight::{COMPENSATED, Flown, JointUnit, fly_one};
+use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown};
 
 fn unit() -> JointUnit {
     dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap())
 }
 
-fn show(what: &str, flight: &Flight) {
-    println!(
-        "{what}: stable {}, low-pass {:.2} Hz, phase margin {:.0?}, resonances {:.0?} Hz",
-        flight.stable, flight.bandwidth_hz, flight.phase_margin_deg, flight.resonances_hz
-    );
-    for (name, flown) in CONTROLLERS.iter().zip(&flight.flown) {
-        println!(
-            "  {name:20} {:8.2}\" rms {:8.2}\" max {:9.1} \"/s ripple, limits {:?}, within bound {:.3}",
-            flown.error.rms(),
-            flown.error.largest(),
-            flown.ripple.rms(),
-            flown.limits,
-            flown.within_bound
-        );
-    }
-}
-
-fn flown(scenario: &Scenario) -> Flight {
-    fly(scenario, &unit()).unwrap()
-}
-
 fn alone(scenario: &Scenario, kind: usize) -> Flown {
     fly_one(scenario, &unit(), kind).unwrap()
-}
-
-/// On a unit that its table was sampled from with noise, the core removes what an inverse that knows everything but the
-/// motion removes, and keeps the joint as stable as it was.
-#[test]
-fn the_core_removes_what_a_quasi_static_inverse_removes() {
-    let mut left = Vec::new();
-    for torque in [TorqueKnown::OnLoad, TorqueKnown::InMesh, TorqueKnown::Current, TorqueKnown::Not] {
-        let flight = flown(&Scenario { torque, ..scenario() });
-        show(&format!("{torque:?}"), &flight);
-        let [none, .., by_direction, core, ideal] = [0, 1, 2, 3, 4].map(|k| flight.flown[k].error.rms());
-        assert!(flight.stable && core < by_direction, "{torque:?}: {core} {by_direction}");
-        left.push((none - core) / (none - ideal));
-        if torque == TorqueKnown::Current {
-            // The bound that is stated with the torque.
-            assert!(flight.flown[COMPENSATED].within_bound > 0.95, "{}", flight.flown[COMPENSATED].within_bound);
-        }
-    }
-    println!("removed of what the ideal removes, torque on load, in mesh, by current, unknown: {left:.3?}");
-    assert!(left[0] > 0.95 && left[1] > 0.9 && left[2] > left[3]);
 }
 
 #[test]
