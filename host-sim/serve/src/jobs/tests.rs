@@ -157,17 +157,6 @@ fn a_job_ends_within_a_second_wherever_it_is_and_leaves_nothing_unfinished() {
 }
 
 #[test]
-fn only_so_many_wait() {
-    let bench = Bench::new();
-    let first = bench.jobs.add(long("tables")).unwrap().id;
-    bench.until(first, JobStatus::Running);
-    let added: Vec<_> = (0..100).map(|_| bench.jobs.add(long("tables"))).collect();
-    assert_eq!(added.iter().filter(|added| added.is_ok()).count(), MOST_WAITING);
-    assert!(matches!(added.last(), Some(Err(JobError::Full))));
-    bench.jobs.end();
-}
-
-#[test]
 fn a_server_that_starts_again_finds_what_was_finished_and_ends_what_was_not() {
     let bench = Bench::new();
     let done = bench.jobs.add(look()).unwrap().id;
