@@ -68,23 +68,6 @@ fn nothing_is_named_on_a_drive_within_its_spread() {
 
 #[test]
 #[ignore = "long: tests/run slow"]
-fn an_eccentric_circular_spline_is_told_from_a_runout_of_the_flexspline_and_measured() {
-    for (name, other) in [
-        (CauseName::CircularSplineEccentricity, CauseName::FlexsplineRunout),
-        (CauseName::FlexsplineRunout, CauseName::CircularSplineEccentricity),
-    ] {
-        let hidden = format!("{name}:amplitude_arcsec=35.4,phase_rad=0.7,half_load_n_m=14");
-        let diagnosis = diagnosed(&[&hidden], 7);
-        assert_eq!(names(&diagnosis), [name], "{}", diagnosis.text());
-        assert!(!diagnosis.causes[0].look_alikes.contains(&other));
-        assert_eq!(diagnosis.verdict, Verdict::Explained, "{}", diagnosis.text());
-        let held = diagnosis.held_out;
-        assert!(held.rms_after_arcsec < 0.5 * held.rms_before_arcsec, "{held:?}");
-    }
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
 fn sizes_come_with_intervals_that_hold_the_truth() {
     for (name, parameter, truth) in [
         (CauseName::SensorLatency, "delay_s", 2e-3),
@@ -406,20 +389,6 @@ fn bad_rows_move_no_line_by_more_than_its_interval() {
     eprintln!("moved by {moved:.2?} standard deviations");
     // Intervals of 95 %: what the rows left out take away moves it as well.
     assert!(moved.iter().all(|moved| *moved < 2.0), "{moved:.2?}");
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn two_effects_at_once_are_both_named_or_said_to_look_alike() {
-    let both = [CauseName::TorsionalHysteresis, CauseName::OutputEncoderEccentricity];
-    let diagnosis = diagnosed(&[LOOP, "output_encoder_eccentricity:amplitude_arcsec=14,phase_rad=2"], 3);
-    assert_eq!(diagnosis.causes.len(), 2, "{}", diagnosis.text());
-    for name in both {
-        let found = diagnosis.causes.iter().any(|c| c.name == name || c.look_alikes.contains(&name));
-        assert!(found, "{name} in {}", diagnosis.text());
-    }
-    let held = diagnosis.held_out;
-    assert!(held.rms_after_arcsec < 0.5 * held.rms_before_arcsec, "{held:?}");
 }
 
 #[test]

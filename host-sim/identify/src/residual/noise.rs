@@ -73,24 +73,3 @@ fn correlation_length(values: &[f64]) -> f64 {
     }
     length.max(1.0)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_memory_of_an_autoregressive_noise_is_found() {
-        let mut random = fastrand::Rng::with_seed(5);
-        for rho in [0.0_f64, 0.9, 0.99] {
-            let mut x = 0.0;
-            let values: Vec<f64> = (0..200_000)
-                .map(|_| {
-                    x = rho * x + (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
-                    x
-                })
-                .collect();
-            let (found, due) = (correlation_length(&values), (1.0 + rho) / (1.0 - rho));
-            assert!((found / due - 1.0).abs() < 0.2, "{rho}: {found}, due {due}");
-        }
-    }
-}
