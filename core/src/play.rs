@@ -257,7 +257,6 @@ crate::upset::upsets!(PlayState { nominal, error, lower, upper, half });
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::vec::Vec;
 
     const HALF: i32 = 100_000;
 

@@ -288,6 +288,12 @@ fn is_text(text: *const std::ffi::c_char) -> bool {
     (1..60).contains(&text.to_bytes().len())
 }
 
+/// Of a call of these objects that answers: its result, whether all its arguments can be used, and whether something
+/// overlaps.
+fn answered<T>(status: c::FlexsplineStatus, objects: &[Given], to: Answer<T>) -> (u32, bool, bool) {
+    (status as u32, objects.iter().all(|object| object.usable) && to.usable, to.overlaps)
+}
+
 /// A call next to a tick: its result, whether all its arguments can be used, and whether something overlaps.
 fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool, bool) {
     let [learner, slip, path, aged, encoder, recorder] = [0, 1, 2, 3, 4, 5].map(|kind| memory.beside(choices, kind));
@@ -295,8 +301,9 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         [6, 7, 8, 9, 10, 11].map(|kind| memory.beside(choices, kind));
     let start_up = memory.beside(choices, 12);
     let (store, joint, state) = (o.store, o.joint, o.state);
+    let (joint_at, store_at, state_at) = (joint.pointer.cast(), store.pointer.cast(), state.pointer.cast());
     let all = |objects: &[Given]| objects.iter().all(|object| object.usable);
-    // Of a call that writes nothing but its objects, and of one that answers.
+    // Of a call that writes nothing but its objects.
     let done = |status: c::FlexsplineStatus, objects: &[Given]| (status as u32, all(objects), false);
     let records: *mut c::FlexsplineRecord = memory.at(PLACES.records).cast();
     let buffer: *mut u8 = memory.at(PLACES.buffer).cast();
@@ -335,11 +342,10 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         1 => done(c::flexspline_learner_set(learner.pointer.cast(), choices.below(4) as u8), &[learner]),
         2 if choices.any() => done(c::flexspline_learner_reset(learner.pointer.cast()), &[learner]),
-        2 => {
-            let (at, of) = (learner.pointer.cast(), (joint.pointer.cast(), store.pointer.cast()));
-            let status = c::flexspline_learner_bind(at, of.0, of.1, choices.any());
-            (status as u32, all(&[learner, joint, store]), false)
-        }
+        2 => done(
+            c::flexspline_learner_bind(learner.pointer.cast(), joint_at, store_at, choices.any()),
+            &[learner, joint, store],
+        ),
         3..=6 => {
             let input = [Input {
                 generator_counts: choices.any::<i32>().into(),
@@ -353,7 +359,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let (input, plain_ok) = plain(choices, &input);
             let to = memory.answer::<c::FlexsplineAdapted>(choices, &[learner, state]);
             let (has, measured) = (choices.below(4) as u8, choices.any::<i32>().into());
-            let (learner_at, state_at) = (learner.pointer.cast(), state.pointer.cast());
+            let learner_at = learner.pointer.cast();
             let status = c::flexspline_learner_update(learner_at, state_at, input, output, has, measured, to.pointer);
             if status as u32 == OK {
                 let found = unsafe { to.pointer.read() };
@@ -365,16 +371,11 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         7 => {
             let to = memory.answer(choices, &[learner]);
-            let status = c::flexspline_learner_coefficient(learner.pointer.cast(), number, to.pointer);
-            (status as u32, learner.usable && to.usable, to.overlaps)
+            answered(c::flexspline_learner_coefficient(learner.pointer.cast(), number, to.pointer), &[learner], to)
         }
         8 => {
             let to = memory.answer(choices, &[learner]);
-            (
-                c::flexspline_learner_report(learner.pointer.cast(), to.pointer) as u32,
-                learner.usable && to.usable,
-                to.overlaps,
-            )
+            answered(c::flexspline_learner_report(learner.pointer.cast(), to.pointer), &[learner], to)
         }
         9 | 10 => {
             let (of, call) = if choices.any() { (learner, 0) } else { (slip, 1) };
@@ -438,8 +439,11 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         18 => {
             let to = memory.answer(choices, &[path]);
             let (place, direction) = (choices.below(3) as u8, choices.below(3) as i8 - 1);
-            let status = c::flexspline_torque_tick(path.pointer.cast(), place, choices.wild(), direction, to.pointer);
-            (status as u32, path.usable && to.usable, to.overlaps)
+            answered(
+                c::flexspline_torque_tick(path.pointer.cast(), place, choices.wild(), direction, to.pointer),
+                &[path],
+                to,
+            )
         }
         19 => done(c::flexspline_aged_init(aged.pointer.cast(), choices.any()), &[aged]),
         20 => {
@@ -450,8 +454,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         21 => {
             let to = memory.answer(choices, &[aged]);
-            let status = c::flexspline_aged_is_stale(aged.pointer.cast(), to.pointer);
-            (status as u32, aged.usable && to.usable, to.overlaps)
+            answered(c::flexspline_aged_is_stale(aged.pointer.cast(), to.pointer), &[aged], to)
         }
         22 => {
             let settings = [c::FlexsplineEncoderSettings {
@@ -470,20 +473,17 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         24 => {
             let to = memory.answer(choices, &[joint, state, encoder]);
             let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
-            let (of, at) = ((joint.pointer.cast(), state.pointer.cast()), encoder.pointer.cast());
-            let status = c::flexspline_joint_read(of.0, of.1, at, reading, to.pointer);
-            (status as u32, all(&[joint, state, encoder]) && to.usable, to.overlaps)
+            let (of, at) = ((joint_at, state_at), encoder.pointer.cast());
+            answered(c::flexspline_joint_read(of.0, of.1, at, reading, to.pointer), &[joint, state, encoder], to)
         }
         25 => {
             let to = memory.answer(choices, &[encoder]);
             let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
-            let status = c::flexspline_encoder_read(encoder.pointer.cast(), reading, to.pointer);
-            (status as u32, encoder.usable && to.usable, to.overlaps)
+            answered(c::flexspline_encoder_read(encoder.pointer.cast(), reading, to.pointer), &[encoder], to)
         }
         26 => {
             let to = memory.answer(choices, &[encoder]);
-            let status = c::flexspline_encoder_reading(encoder.pointer.cast(), choices.any(), to.pointer);
-            (status as u32, encoder.usable && to.usable, to.overlaps)
+            answered(c::flexspline_encoder_reading(encoder.pointer.cast(), choices.any(), to.pointer), &[encoder], to)
         }
         27 => {
             let (places, offset) = (choices.below(RECORDS + 1) as u16, choices.below(3) as u32);
@@ -492,15 +492,15 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         28 | 29 => {
             let inside = choices.below(8) == 0;
-            let list = if inside { state.pointer.cast() } else { records };
+            let list = if inside { state_at } else { records };
             let [store, state, recorder] = [store, state, recorder];
             let status = c::flexspline_recorder_see(
                 recorder.pointer.cast(),
                 list,
                 choices.any(),
                 choices.below(2) as u8,
-                state.pointer.cast(),
-                store.pointer.cast(),
+                state_at,
+                store_at,
                 output,
             );
             (status as u32, all(&[store, state, recorder]) && output_usable, inside)
@@ -508,22 +508,24 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         30 => {
             let to = memory.answer(choices, &[recorder]);
             let is_taken: *mut u8 = memory.at(PLACES.saved).cast();
-            let status = c::flexspline_recorder_take(recorder.pointer.cast(), records, to.pointer, is_taken);
-            (status as u32, recorder.usable && to.usable, to.overlaps)
+            answered(
+                c::flexspline_recorder_take(recorder.pointer.cast(), records, to.pointer, is_taken),
+                &[recorder],
+                to,
+            )
         }
         31 => {
             let (from, to) = (memory.at(PLACES.saved), memory.answer(choices, &[]));
             match choices.any() {
-                true => done(c::flexspline_record_encode(from.cast(), to.pointer), &[to]),
+                true => answered(c::flexspline_record_encode(from.cast(), to.pointer), &[], to),
                 false => {
                     let to = memory.answer(choices, &[]);
-                    done(c::flexspline_record_decode(from.cast(), to.pointer), &[to])
+                    answered(c::flexspline_record_decode(from.cast(), to.pointer), &[], to)
                 }
             }
         }
         32 => {
             let to = memory.answer::<[u8; c::FLEXSPLINE_RECORD_BYTES]>(choices, &[state, store]);
-            let (state_at, store_at) = (state.pointer.cast(), store.pointer.cast());
             let status = c::flexspline_record(choices.any(), 1, 0, state_at, store_at, output, to.pointer);
             (status as u32, all(&[state, store]) && output_usable && to.usable, to.overlaps)
         }
@@ -531,7 +533,6 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             true => done(c::flexspline_watch_init(watch.pointer.cast()), &[watch]),
             false => {
                 let to = memory.answer(choices, &[watch, state, store]);
-                let (state_at, store_at) = (state.pointer.cast(), store.pointer.cast());
                 let status = c::flexspline_watch_see(watch.pointer.cast(), state_at, store_at, output, to.pointer);
                 (status as u32, all(&[watch, state, store]) && output_usable && to.usable, to.overlaps)
             }
@@ -550,8 +551,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             true => done(c::flexspline_observer_init(observer.pointer.cast()), &[observer]),
             false => {
                 let to = memory.answer(choices, &[observer]);
-                let status = c::flexspline_observer_report(observer.pointer.cast(), to.pointer);
-                (status as u32, observer.usable && to.usable, to.overlaps)
+                answered(c::flexspline_observer_report(observer.pointer.cast(), to.pointer), &[observer], to)
             }
         },
         36 => {
@@ -581,9 +581,9 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let status = c::flexspline_predict(
                 predictor.pointer.cast(),
                 observer.pointer.cast(),
-                joint.pointer.cast(),
-                store.pointer.cast(),
-                state.pointer.cast(),
+                joint_at,
+                store_at,
+                state_at,
                 now,
                 to.pointer,
             );
@@ -591,25 +591,27 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         38 => {
             let to = memory.answer(choices, &[predictor]);
-            let status = c::flexspline_predictor_parts(predictor.pointer.cast(), to.pointer);
-            (status as u32, predictor.usable && to.usable, to.overlaps)
+            answered(c::flexspline_predictor_parts(predictor.pointer.cast(), to.pointer), &[predictor], to)
         }
         39 => {
             let to = memory.answer(choices, &[joint, store, state]);
-            let (joint_at, store_at, state_at) = (joint.pointer.cast(), store.pointer.cast(), state.pointer.cast());
             let torque = choices.wild();
-            let status = c::flexspline_forward(joint_at, store_at, state_at, choices.any(), torque, to.pointer);
-            (status as u32, all(&[joint, store, state]) && to.usable, to.overlaps)
+            answered(
+                c::flexspline_forward(joint_at, store_at, state_at, choices.any(), torque, to.pointer),
+                &[joint, store, state],
+                to,
+            )
         }
         40 => {
             let to = memory.answer(choices, &[joint, store, state]);
-            let (joint_at, store_at, state_at) = (joint.pointer.cast(), store.pointer.cast(), state.pointer.cast());
             let (target, torque, way) = (choices.any(), choices.wild(), choices.below(5) as i8 - 2);
-            let status = c::flexspline_inverse(joint_at, store_at, state_at, target, torque, way, to.pointer);
-            (status as u32, all(&[joint, store, state]) && to.usable, to.overlaps)
+            answered(
+                c::flexspline_inverse(joint_at, store_at, state_at, target, torque, way, to.pointer),
+                &[joint, store, state],
+                to,
+            )
         }
         41 => {
-            let (joint_at, store_at) = (joint.pointer.cast(), store.pointer.cast());
             let objects = [joint, store];
             let to = memory.answer(choices, &objects);
             let (rate, torque, ahead) = (choices.wild(), choices.wild(), choices.wild());
@@ -623,19 +625,17 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             (status as u32, all(&objects) && to.usable, to.overlaps)
         }
         42 => {
-            let joint_at = joint.pointer.cast();
             let to = memory.answer(choices, &[joint]);
             let status = match choices.below(4) {
                 0 => c::flexspline_nominal_output(joint_at, choices.any(), to.pointer),
                 1 => c::flexspline_nominal_generator(joint_at, choices.any(), to.pointer),
                 2 => {
                     let to = memory.answer(choices, &[joint]);
-                    let status = c::flexspline_ratio(joint_at, to.pointer);
-                    return (status as u32, joint.usable && to.usable, to.overlaps);
+                    return answered(c::flexspline_ratio(joint_at, to.pointer), &[joint], to);
                 }
                 _ => {
                     let to = memory.answer(choices, &[state]);
-                    let status = c::flexspline_state_play(state.pointer.cast(), to.pointer);
+                    let status = c::flexspline_state_play(state_at, to.pointer);
                     return (status as u32, state.usable && to.usable, to.overlaps);
                 }
             };
@@ -645,12 +645,11 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let to = memory.answer::<u8>(choices, &[activation, store]);
             if choices.below(16) == 0 {
                 let temperature = choices.wild();
-                let begun =
-                    c::flexspline_activation_begin(activation.pointer.cast(), joint.pointer.cast(), temperature);
+                let begun = c::flexspline_activation_begin(activation.pointer.cast(), joint_at, temperature);
                 return (begun as u32, all(&[activation, joint]), false);
             }
             let usable = all(&[activation, store]) && to.usable && o.tables_usable;
-            let (activation_at, store_at) = (activation.pointer.cast(), store.pointer.cast());
+            let activation_at = activation.pointer.cast();
             let mut status = 0;
             // Far enough to fill the store now and then.
             for _ in 0..1 + 40 * choices.below(16) {
@@ -673,8 +672,11 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 let to = memory.answer(choices, &[identity]);
                 let image = &BASES[choices.below(3)];
                 let length = choices.below(image.len() + 1);
-                let status = c::flexspline_identity_step(identity.pointer.cast(), image.as_ptr(), length, to.pointer);
-                (status as u32, identity.usable && to.usable, to.overlaps)
+                answered(
+                    c::flexspline_identity_step(identity.pointer.cast(), image.as_ptr(), length, to.pointer),
+                    &[identity],
+                    to,
+                )
             }
             2 => {
                 let to = memory.answer(choices, &[]);
@@ -691,8 +693,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 let (length, page) = (choices.below(8 * BUFFER_WORDS + 1), choices.below(40) as u8);
                 let image = choices.below(3) as u8;
                 let good = &BASES[0];
-                let status =
-                    c::flexspline_store_mend_page(store.pointer.cast(), buffer, good.as_ptr(), length, image, page);
+                let status = c::flexspline_store_mend_page(store_at, buffer, good.as_ptr(), length, image, page);
                 (status as u32, store.usable, false)
             }
         },
@@ -705,7 +706,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             }; 2];
             let (settings, plain_ok) = plain(choices, &settings);
             let (at, from) = (start_up.pointer.cast(), choices.any());
-            let status = c::flexspline_start_up_init(at, joint.pointer.cast(), from, settings);
+            let status = c::flexspline_start_up_init(at, joint_at, from, settings);
             (status as u32, all(&[start_up, joint]) && plain_ok, false)
         }
         46 => {
@@ -725,14 +726,17 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         47 => {
             let saved: *mut u8 = memory.at(PLACES.saved).cast();
             let room = choices.below(8 * OTHER_WORDS);
-            let (slip_at, joint_at, store_at) = (slip.pointer.cast(), joint.pointer.cast(), store.pointer.cast());
+            let slip_at = slip.pointer.cast();
             if choices.any() {
                 let status = c::flexspline_slip_restore_for(slip_at, joint_at, store_at, saved, room);
                 return (status as u32, all(&[slip, joint, store]), false);
             }
             let to = memory.answer(choices, &[slip, joint, store]);
-            let status = c::flexspline_slip_save_for(slip_at, joint_at, store_at, saved, room, to.pointer);
-            (status as u32, all(&[slip, joint, store]) && to.usable, to.overlaps)
+            answered(
+                c::flexspline_slip_save_for(slip_at, joint_at, store_at, saved, room, to.pointer),
+                &[slip, joint, store],
+                to,
+            )
         }
         48 => {
             let jump = if choices.any() { 5.0 } else { choices.wild() };
@@ -794,7 +798,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                     assert!(c::flexspline_rad_from_counts(from).is_finite());
                     let answer = memory.answer(choices, &[]);
                     let rad = f64::from(choices.wild());
-                    done(c::flexspline_counts_from_rad(rad, answer.pointer), &[answer])
+                    answered(c::flexspline_counts_from_rad(rad, answer.pointer), &[], answer)
                 }
             }
         }

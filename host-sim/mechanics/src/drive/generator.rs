@@ -432,9 +432,21 @@ mod tests {
         }
     }
 
+    /// The normal is the gradient of the distance; returned is by what it turns along the outline.
+    fn turns_as_its_gradient(outline: &GeneratorOutline, kind: GeneratorKind, p: [f64; 2], foot: &OutlineFoot) -> f64 {
+        let step = 1e-5;
+        let d = |dx, dy| outline.nearest([p[0] + dx, p[1] + dy]).distance;
+        let gradient = [(d(step, 0.0) - d(-step, 0.0)) / (2.0 * step), (d(0.0, step) - d(0.0, -step)) / (2.0 * step)];
+        let error = (gradient[0] - foot.normal[0]).hypot(gradient[1] - foot.normal[1]);
+        assert!(error < 1e-8, "{kind} {p:?}: {error}");
+        let q = [p[0] - foot.distance * foot.normal[0], p[1] - foot.distance * foot.normal[1]];
+        let n = |s: f64| outline.nearest([q[0] - s * foot.normal[1], q[1] + s * foot.normal[0]]).normal;
+        let (a, b) = (n(-step), n(step));
+        (a[0] * b[1] - a[1] * b[0]) / (2.0 * step)
+    }
+
     #[test]
     fn the_foot_is_the_closest_point_and_gradient_and_curvature_agree_with_differences() {
-        let step = 1e-5;
         for kind in GeneratorKind::ALL {
             let outline = outline(kind);
             let line: Vec<[f64; 2]> = outline.polyline(20_000).concat();
@@ -451,17 +463,7 @@ mod tests {
                         foot.distance
                     );
                 }
-                let d = |dx, dy| outline.nearest([p[0] + dx, p[1] + dy]).distance;
-                let gradient =
-                    [(d(step, 0.0) - d(-step, 0.0)) / (2.0 * step), (d(0.0, step) - d(0.0, -step)) / (2.0 * step)];
-                let error = (gradient[0] - foot.normal[0]).hypot(gradient[1] - foot.normal[1]);
-                assert!(error < 1e-8, "{kind} {p:?}: {error}");
-                // along the outline the normal turns by its curvature
-                let q = [p[0] - foot.distance * foot.normal[0], p[1] - foot.distance * foot.normal[1]];
-                let tangent = [-foot.normal[1], foot.normal[0]];
-                let n = |s: f64| outline.nearest([q[0] + s * tangent[0], q[1] + s * tangent[1]]).normal;
-                let (a, b) = (n(-step), n(step));
-                let turn = (a[0] * b[1] - a[1] * b[0]) / (2.0 * step);
+                let turn = turns_as_its_gradient(&outline, kind, p, &foot);
                 assert!((turn - foot.curvature).abs() < 1e-6, "{kind} {p:?}: {turn} {}", foot.curvature);
             }
         }
@@ -482,23 +484,14 @@ mod tests {
 
     #[test]
     fn gradient_and_curvature_of_a_malformed_generator_agree_with_differences() {
-        let step = 1e-5;
         for kind in GeneratorKind::ALL {
             let outline = malformed(kind);
             for p in points().skip(1).step_by(97) {
                 let foot = outline.nearest(p);
-                let d = |dx, dy| outline.nearest([p[0] + dx, p[1] + dy]).distance;
-                let gradient =
-                    [(d(step, 0.0) - d(-step, 0.0)) / (2.0 * step), (d(0.0, step) - d(0.0, -step)) / (2.0 * step)];
-                let error = (gradient[0] - foot.normal[0]).hypot(gradient[1] - foot.normal[1]);
-                assert!(error < 1e-8, "{kind} {p:?}: {error}");
                 assert!((foot.normal[0].hypot(foot.normal[1]) - 1.0).abs() < 4e-6);
                 let q = [p[0] - foot.distance * foot.normal[0], p[1] - foot.distance * foot.normal[1]];
                 assert!(outline.nearest(q).distance.abs() < 2e-5 * foot.distance.abs().max(1e-3), "{kind} {p:?}");
-                let tangent = [-foot.normal[1], foot.normal[0]];
-                let n = |s: f64| outline.nearest([q[0] + s * tangent[0], q[1] + s * tangent[1]]).normal;
-                let (a, b) = (n(-step), n(step));
-                let turn = (a[0] * b[1] - a[1] * b[0]) / (2.0 * step);
+                let turn = turns_as_its_gradient(&outline, kind, p, &foot);
                 assert!((turn / foot.curvature - 1.0).abs() < 1e-3, "{kind} {p:?}: {turn} {}", foot.curvature);
             }
         }
