@@ -151,12 +151,38 @@ mod tests {
     use crate::motion::Motion;
     use crate::stepping::{Method, Problem, SolverSettings};
 
+    fn coarse() -> SolverSettings {
+        SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
+    }
+
+    /// A drive with a generator at its reference temperature, on the coarse mesh.
+    fn problem(drive: &Drive, kind: GeneratorKind) -> Problem {
+        Problem::new(drive, kind, 20.0, coarse()).unwrap()
+    }
+
+    /// Error of both solvers where the drive ends that moves under 50 N·m, arcsec; they agree to 0.1″.
+    fn both_solvers_agree(drive: &Drive, kind: GeneratorKind, mesh: MeshLevel, moves: impl Fn(&mut Motion<'_>)) {
+        let [fast, reference] = [Method::Fast, Method::Reference].map(|method| {
+            let settings = SolverSettings { method, mesh, ..SolverSettings::default() };
+            let problem = Problem::new(drive, kind, 20.0, settings).unwrap();
+            let mut motion = Motion::deformed(&problem, 0.0).unwrap();
+            motion.load(50.0).unwrap();
+            moves(&mut motion);
+            motion.error_arcsec()
+        });
+        println!("{} {kind}: {fast} {reference}", drive.name);
+        assert!((fast - reference).abs() < 0.1, "{} {kind}: {fast} {reference}", drive.name);
+    }
+
+    fn a_quarter_of_a_pitch(motion: &mut Motion<'_>) {
+        motion.turn_in(0.25 * motion.pitch(), 2).unwrap();
+    }
+
     /// The amplitudes see a wave of their own order and phase, as that of the middle surface, and nothing else.
     #[test]
     fn a_wave_is_measured_by_its_own_amplitude_alone() {
         let drive = Drive::hhd_95().with_set("sleeve.kind=hermetic").unwrap();
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+        let problem = problem(&drive, GeneratorKind::Cam);
         let (mesh, _) = problem.wheels();
         let radius = drive.flexspline.neutral_radius_mm();
         // An oval without stretching, normals straight: W = 1, V = -1/n in the middle of the rim.
@@ -206,8 +232,7 @@ mod tests {
     #[test]
     fn a_cam_in_a_closed_sleeve_pushes_with_kilonewtons_and_loses_nothing() {
         let drive = Drive::hhd_95().with_set("sleeve.kind=hermetic").unwrap();
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+        let problem = problem(&drive, GeneratorKind::Cam);
         let mut motion = Motion::deformed(&problem, 0.0).unwrap();
         let force = motion.last().lobe_force_n;
         assert!((force / 2400.0 - 1.0).abs() < 0.07, "{force}");
@@ -226,8 +251,7 @@ mod tests {
     /// Mirrored in the axis of a tooth: the same drive under the opposite load, turned the other way, errs by the
     /// opposite.
     fn errs_by_the_opposite_when_mirrored(drive: &Drive) {
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        let problem = Problem::new(drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+        let problem = problem(drive, GeneratorKind::Cam);
         let [there, mirrored] = [1.0, -1.0].map(|sense: f64| {
             let mut motion = Motion::deformed(&problem, 0.0).unwrap();
             motion.load(30.0 * sense).unwrap();
@@ -244,8 +268,7 @@ mod tests {
 
     /// A drive under the cam, loaded and settled; two pitches, with the given number of places in each.
     fn two_pitches(drive: &Drive, torque_n_m: f64, places: usize) -> Vec<crate::motion::SettledPlace> {
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        let problem = Problem::new(drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+        let problem = problem(drive, GeneratorKind::Cam);
         let mut motion = Motion::deformed(&problem, 0.0).unwrap();
         motion.load(torque_n_m).unwrap();
         motion.settle(motion.pitch() / places as f64).unwrap();
@@ -301,9 +324,7 @@ mod tests {
     #[test]
     fn a_straight_face_is_the_plane_slice() {
         let error = |drive: Drive| {
-            let settings =
-                SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-            let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+            let problem = problem(&drive, GeneratorKind::Cam);
             let mut motion = Motion::deformed(&problem, 0.0).unwrap();
             motion.load(50.0).unwrap();
             motion.turn(0.3 * motion.pitch()).unwrap();
@@ -327,14 +348,13 @@ mod tests {
     #[test]
     #[ignore = "long: tests/run slow"]
     fn leaning_teeth_that_hardly_touch_find_their_equilibrium() {
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         for (drive, kind, taper_mrad) in [
             (Drive::cup_95(), GeneratorKind::Cam, 5.0),
             (Drive::cup_95(), GeneratorKind::TwoRoller, 5.0),
             (Drive::hhd_95_hermetic(), GeneratorKind::Cam, 0.4),
             (Drive::hhd_95_hermetic(), GeneratorKind::FourRoller, 0.0),
         ] {
-            let problem = Problem::new(&sliced(drive, taper_mrad), kind, 20.0, settings).unwrap();
+            let problem = problem(&sliced(drive, taper_mrad), kind);
             let what = format!("{} {kind} {taper_mrad} mrad", problem.drive.name);
             let mut motion = Motion::deformed(&problem, 0.0).unwrap_or_else(|error| panic!("{what}: {error}"));
             motion.load(50.0).unwrap_or_else(|error| panic!("{what}: {error}"));
@@ -350,8 +370,7 @@ mod tests {
     /// on.
     #[test]
     fn teeth_that_wedge_do_not_go_round_in_a_circle() {
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        let problem = Problem::new(&sliced(Drive::cup_95(), 0.0), GeneratorKind::Cam, 20.0, settings).unwrap();
+        let problem = problem(&sliced(Drive::cup_95(), 0.0), GeneratorKind::Cam);
         let mut motion = Motion::deformed(&problem, 0.0).unwrap();
         for torque_n_m in [23.64, 23.75, 36.0] {
             motion.load(torque_n_m).unwrap_or_else(|error| panic!("{torque_n_m} N·m: {error}"));
@@ -364,12 +383,7 @@ mod tests {
     /// closes. Without that in the step iterations run out.
     #[test]
     fn rough_leaning_teeth_are_loaded_and_unloaded() {
-        let settings = SolverSettings {
-            method: Method::Fast,
-            mesh: MeshLevel::Coarse,
-            max_halvings: 0,
-            ..SolverSettings::default()
-        };
+        let settings = SolverSettings { max_halvings: 0, ..coarse() };
         let sets = ["flanks.friction_coefficient=0.08", "flexspline.crowning_um=20", "flanks.preload_um=-20"];
         let drive = sliced(Drive::s_95(), 0.0).with_sets(sets).unwrap();
         let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
@@ -411,18 +425,7 @@ mod tests {
         // The cam in the sleeve differs from both by halves: `FLEXSPLINE_LONG` has it too.
         let count = if std::env::var_os("FLEXSPLINE_LONG").is_some() { 3 } else { 2 };
         for (drive, kind, taper_mrad) in cases.into_iter().take(count) {
-            let drive = sliced(drive, taper_mrad);
-            let errors = [Method::Fast, Method::Reference].map(|method| {
-                let settings = SolverSettings { method, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-                let problem = Problem::new(&drive, kind, 20.0, settings).unwrap();
-                let mut motion = Motion::deformed(&problem, 0.0).unwrap();
-                motion.load(50.0).unwrap();
-                motion.turn_in(0.25 * motion.pitch(), 2).unwrap();
-                motion.error_arcsec()
-            });
-            let [fast, reference] = errors;
-            println!("{} {kind} {taper_mrad}: {fast} {reference}", drive.name);
-            assert!((fast - reference).abs() < 0.1, "{} {kind}: {fast} {reference}", drive.name);
+            both_solvers_agree(&sliced(drive, taper_mrad), kind, MeshLevel::Coarse, a_quarter_of_a_pitch);
         }
     }
 
@@ -434,15 +437,10 @@ mod tests {
         let hermetic = Drive::hhd_95().with_set("sleeve.kind=hermetic").unwrap();
         for drive in [hermetic, Drive::cup_95()] {
             for kind in [GeneratorKind::Cam, GeneratorKind::DoubleDisc] {
-                let [fast, reference] = [Method::Fast, Method::Reference].map(|method| {
-                    let settings = SolverSettings { method, ..SolverSettings::default() };
-                    let problem = Problem::new(&drive, kind, 20.0, settings).unwrap();
-                    let mut motion = Motion::deformed(&problem, 0.0).unwrap();
-                    motion.load(50.0).unwrap();
+                let turned = |motion: &mut Motion<'_>| {
                     motion.turn(1.3 * motion.pitch()).unwrap();
-                    motion.error_arcsec()
-                });
-                assert!((fast - reference).abs() < 0.1, "{} {kind}: {fast} {reference}", drive.name);
+                };
+                both_solvers_agree(&drive, kind, MeshLevel::Standard, turned);
             }
         }
     }
@@ -452,10 +450,9 @@ mod tests {
     #[test]
     #[ignore = "long: tests/run slow"]
     fn s_shaped_teeth_lose_nothing_and_a_quarter_of_them_bears() {
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         for (kind, least, most) in [(GeneratorKind::Cam, 0.2, 0.5), (GeneratorKind::DoubleDisc, 0.1, 0.5)] {
             let drive = Drive::s_95();
-            let problem = Problem::new(&drive, kind, 20.0, settings).unwrap();
+            let problem = problem(&drive, kind);
             let mut motion = Motion::deformed(&problem, 0.0).unwrap();
             motion.load(200.0).unwrap();
             motion.settle(motion.pitch() / 8.0).unwrap();
@@ -481,17 +478,7 @@ mod tests {
     #[ignore = "long: tests/run slow"]
     fn both_solvers_agree_on_s_shaped_teeth_and_the_mirror_holds() {
         errs_by_the_opposite_when_mirrored(&Drive::s_95());
-        let errors = [Method::Fast, Method::Reference].map(|method| {
-            let settings = SolverSettings { method, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-            let problem = Problem::new(&Drive::s_95(), GeneratorKind::Cam, 20.0, settings).unwrap();
-            let mut motion = Motion::deformed(&problem, 0.0).unwrap();
-            motion.load(50.0).unwrap();
-            motion.turn_in(0.25 * motion.pitch(), 2).unwrap();
-            motion.error_arcsec()
-        });
-        let [fast, reference] = errors;
-        println!("{fast} {reference}");
-        assert!((fast - reference).abs() < 0.1, "{fast} {reference}");
+        both_solvers_agree(&Drive::s_95(), GeneratorKind::Cam, MeshLevel::Coarse, a_quarter_of_a_pitch);
     }
 
     /// A preload is the depth that is missing of a worn flank, with the other sign: clearance opens by it along the
@@ -499,10 +486,8 @@ mod tests {
     #[test]
     fn clearance_is_worn_flanks_by_another_name() {
         let play = |set: &str| {
-            let settings =
-                SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
             let drive = Drive::hhd_95().with_set(set).unwrap();
-            let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+            let problem = problem(&drive, GeneratorKind::Cam);
             let mut motion = Motion::deformed(&problem, 0.0).unwrap();
             motion.load(0.5).unwrap();
             motion.error_arcsec()
