@@ -103,29 +103,6 @@ fn a_result_file_is_a_path_that_gives_the_same_result() {
 }
 
 #[test]
-#[ignore = "long: tests/run slow"]
-fn both_solvers_write_the_same_files() {
-    let desk = Desk::new();
-    for solver in ["fast", "reference"] {
-        let line = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20 --frames -q";
-        desk.line(&format!("{line} --solver {solver} --out {solver}")).done();
-    }
-    let [fast, reference] = ["fast", "reference"].map(|solver| table(&desk.read(&format!("{solver}/results.csv"))));
-    assert_eq!(fast.0, reference.0);
-    assert_eq!(fast.1.len(), reference.1.len());
-    for (fast, reference) in fast.1.iter().zip(&reference.1) {
-        assert!((fast[3] - reference[3]).abs() < 0.1, "errors {} and {}", fast[3], reference[3]);
-        assert_eq!(fast[5], reference[5], "flanks that touch");
-        assert!((fast[7] / reference[7] - 1.0).abs() < 0.005, "stresses {} and {}", fast[7], reference[7]);
-    }
-    assert_eq!(names(&desk.path("fast")), names(&desk.path("reference")));
-    assert_eq!(names(&desk.path("fast/frames")), names(&desk.path("reference/frames")));
-    let wrong = desk.line("simulate --generator cam --solver quick");
-    assert_eq!(wrong.code, 2);
-    assert!(wrong.stderr.contains("allowed are reference, fast"), "{}", wrong.stderr);
-}
-
-#[test]
 fn quiet_is_silent_and_verbose_speaks_on_stderr() {
     let desk = Desk::new();
     desk.write("path.csv", "generator_rad\n0\n");

@@ -447,27 +447,6 @@ fn a_plan_is_read_as_it_was_written_and_its_lines_may_be_edited() {
     assert!(VariantPlan::read(folder.path()).unwrap_err().to_string().contains("plan anew"));
 }
 
-/// A thicker rim is stiffer under two rollers, which bend it most, and presses on them harder. Rollers that would
-/// overlap are refused for the generator that has them alone.
-#[test]
-fn variants_have_the_data_sheets_of_their_drives() {
-    let rims = of_fields(&["flexspline.rim_thickness_mm=-1,1.4,2.2"], &[GeneratorKind::TwoRoller]).unwrap();
-    let sweep = swept(&rims, Judge::default());
-    assert_eq!((sweep.converged, sweep.refused), (2, 1));
-    assert!(sweep.rows[0].why.contains("rim_thickness_mm") && sweep.rows[0].figures.iter().all(|x| x.is_nan()));
-    let of = |name: &str| [1, 2].map(|k| sweep.rows[k].figures[rims.figure(name).unwrap()]);
-    let [thin, thick] = of("k1_n_m_per_rad");
-    assert!(thick > 2.0 * thin);
-    let [thin, thick] = of("wind_up_arcsec");
-    assert!(thick < thin);
-    let [thin, thick] = of("peak_generator_pressure_mpa");
-    assert!(thick > thin);
-    let rollers = of_fields(&["generator.roller_diameter_mm=40"], &[GeneratorKind::Cam, GeneratorKind::FourRoller]);
-    let sweep = swept(&rollers.unwrap(), Judge::default());
-    assert_eq!(sweep.rows.iter().map(|row| row.status.name()).collect::<Vec<_>>(), ["converged", "refused"]);
-    assert!(sweep.rows[1].why.contains("too large for the four-roller generator"));
-}
-
 #[test]
 fn fields_that_make_no_drive_are_refused_before_anything_runs() {
     let said = |vary: &[&str]| of_fields(vary, &[GeneratorKind::Cam]).unwrap_err().to_string();
