@@ -157,6 +157,13 @@ fn wrong_table_images_are_refused() {
     refused(&desk, "validate --tables . --out nothing", "--tables");
     refused(&desk, "diagnose measured.csv --tables good/cam.fxt --out nothing", "--tables good --generator cam");
     refused(&desk, "diagnose measured.csv --tables good --generator two-roller --out nothing", "--generator cam");
-    desk.write("measured.csv", "output_rad,generator_rad\n0,x\n");
-    refused(&desk, "replay --tables good/cam.fxt measured.csv --out nothing", "generator_rad: found \"x\"");
+    for (rows, said) in [
+        ("generator_rad,torque_n_m\n1,2\n", "neither column output_rad nor error_arcsec"),
+        ("output_rad,generator_rad\n0,x\n", "generator_rad: found \"x\""),
+        ("output_rad,generator_rad\n0,1\n", "1 row after the header; at least 2 are needed"),
+        ("generator_rad,output_rad\n1,nan\n2,0\n", "1 rows have all that is needed"),
+    ] {
+        desk.write("measured.csv", rows);
+        refused(&desk, "replay --tables good/cam.fxt measured.csv --out nothing", said);
+    }
 }

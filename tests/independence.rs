@@ -62,20 +62,8 @@ fn independent(kind: GeneratorKind) {
 
 #[test]
 #[ignore = "long: tests/run slow"]
-fn cam() {
-    independent(GeneratorKind::Cam);
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn double_disc() {
-    independent(GeneratorKind::DoubleDisc);
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn four_roller() {
-    independent(GeneratorKind::FourRoller);
+fn the_other_generators() {
+    [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller].map(independent);
 }
 
 #[test]

@@ -38,20 +38,8 @@ fn mirrors(kind: GeneratorKind) {
 
 #[test]
 #[ignore = "long: tests/run slow"]
-fn cam() {
-    mirrors(GeneratorKind::Cam);
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn double_disc() {
-    mirrors(GeneratorKind::DoubleDisc);
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn four_roller() {
-    mirrors(GeneratorKind::FourRoller);
+fn the_other_generators() {
+    [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller].map(mirrors);
 }
 
 #[test]

@@ -398,22 +398,4 @@ mod tests {
             assert_eq!(parse("m.csv", text(5.0, cell).as_bytes(), 95.0, 20.0).unwrap().len(), 199, "{cell}");
         }
     }
-
-    #[test]
-    fn wrong_files_are_refused_each_with_its_own_message() {
-        for (text, message) in [
-            ("", "column generator_rad is missing"),
-            ("generator_rad,torque_n_m\n1,2\n", "neither column output_rad nor error_arcsec"),
-            ("generator_rad,generator_rad,output_rad\n1,1,1\n", "generator_rad is there twice"),
-            ("generator_rad,output_rad\n", "no rows"),
-            ("generator_rad,output_rad\n1\n", "no rows after the header"),
-            ("generator_rad,output_rad\n1,0.01\n", "1 row after the header; at least 2 are needed"),
-            ("generator_rad,output_rad\n1,abc\n", "output_rad: found \"abc\""),
-            ("generator_rad,output_rad\n1,nan\n2,0\n", "1 rows have all that is needed"),
-            ("generator_rad,output_rad\n1e12,0\n", "generator_rad: found \"1e12\""),
-        ] {
-            let error = parse("m.csv", text.as_bytes(), 95.0, 20.0).unwrap_err().to_string();
-            assert!(error.starts_with("m.csv:") && error.contains(message), "{text:?} gave {error:?}");
-        }
-    }
 }
