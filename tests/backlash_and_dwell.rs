@@ -47,8 +47,9 @@ fn agrees(kind: GeneratorKind, reference_arcmin: f64) {
 #[test]
 #[ignore = "long: tests/run slow"]
 fn the_other_generators() {
-    [(GeneratorKind::Cam, 0.987), (GeneratorKind::DoubleDisc, 1.04), (GeneratorKind::FourRoller, 1.026)]
-        .map(|(kind, reference_arcmin)| agrees(kind, reference_arcmin));
+    agrees(GeneratorKind::Cam, 0.987);
+    agrees(GeneratorKind::DoubleDisc, 1.04);
+    agrees(GeneratorKind::FourRoller, 1.026);
 }
 
 #[test]

@@ -63,7 +63,7 @@ fn independent(kind: GeneratorKind) {
 #[test]
 #[ignore = "long: tests/run slow"]
 fn the_other_generators() {
-    [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller].map(independent);
+    [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller].into_iter().for_each(independent);
 }
 
 #[test]

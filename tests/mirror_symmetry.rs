@@ -39,7 +39,7 @@ fn mirrors(kind: GeneratorKind) {
 #[test]
 #[ignore = "long: tests/run slow"]
 fn the_other_generators() {
-    [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller].map(mirrors);
+    [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller].into_iter().for_each(mirrors);
 }
 
 #[test]

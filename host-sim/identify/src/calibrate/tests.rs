@@ -34,15 +34,7 @@ fn recording(seed: u64, law: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
         session.error_rad.push((error + 5000.0) / ARCSEC_PER_RAD);
         session.torque_n_m.as_mut().unwrap().push(torque);
     }
-    Recording {
-        file: format!("{seed}.log"),
-        rows,
-        sessions: vec![session],
-        faults: Vec::new(),
-        tooth_steps: Vec::new(),
-        notes: Vec::new(),
-        unusable: None,
-    }
+    Recording::made(&format!("{seed}.log"), vec![session])
 }
 
 fn kept(calibration: &Calibration) -> Vec<&'static str> {
@@ -470,17 +462,7 @@ fn played(planned: &Planned, seed: u64, law: impl Fn(f64, f64, f64, f64) -> f64)
             session.torque_n_m.as_mut().unwrap().push(pass.torque_n_m);
         }
     }
-    let rows = session.len();
-    let (faults, tooth_steps, notes) = (Vec::new(), Vec::new(), Vec::new());
-    Recording {
-        file: "planned.log".to_owned(),
-        rows,
-        sessions: vec![session],
-        faults,
-        tooth_steps,
-        notes,
-        unusable: None,
-    }
+    Recording::made("planned.log", vec![session])
 }
 
 /// A unit of parts alone, and a bench without wander, so that the information matrix says all there is to say.

@@ -400,21 +400,9 @@ mod tests {
                 + nominal.wind_up_arcsec(load)
                 + 0.5 * nominal.backlash_arcsec * flank
                 + noise;
-            session.line.push(k as u64 + 2);
-            session.generator_rad.push(psi);
-            session.error_rad.push(error / flexspline_base::units::ARCSEC_PER_RAD);
-            session.time_s.as_mut().unwrap().push(t);
-            session.torque_n_m.as_mut().unwrap().push(told(t, load));
+            session.push([t, psi, error / flexspline_base::units::ARCSEC_PER_RAD, told(t, load)]);
         }
-        Recording {
-            file: "made.csv".into(),
-            rows: session.len(),
-            sessions: vec![session],
-            faults: Vec::new(),
-            tooth_steps: Vec::new(),
-            notes: Vec::new(),
-            unusable: None,
-        }
+        Recording::made("made.csv", vec![session])
     }
 
     /// Fault found, whether data are unusable, and the torque in a row after that.

@@ -119,11 +119,7 @@ fn slow_to_its_other_flank(nominal: &Nominal, lag_s: f64) -> Vec<Session> {
                 let noise = 1.5 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
                 let play = 0.5 * nominal.backlash_arcsec * side;
                 let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + play + noise;
-                session.line.push(k as u64 + 2);
-                session.generator_rad.push(psi);
-                session.error_rad.push(error / ARCSEC_PER_RAD);
-                session.time_s.as_mut().unwrap().push(t + 600.0 * f64::from(number));
-                session.torque_n_m.as_mut().unwrap().push(load);
+                session.push([t + 600.0 * f64::from(number), psi, error / ARCSEC_PER_RAD, load]);
             }
             session
         })
@@ -150,11 +146,12 @@ fn behind_a_low_pass(nominal: &Nominal) -> Vec<Session> {
                 *reading += (output - *reading) * -f64::exp_m1(-step_s / 5e-3);
                 if step % 20 == 19 {
                     let noise = (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
-                    session.line.push(session.len() as u64 + 2);
-                    session.generator_rad.push(psi);
-                    session.error_rad.push(*reading - psi / nominal.ratio + noise / ARCSEC_PER_RAD);
-                    session.time_s.as_mut().unwrap().push(t + row_s + 600.0 * pace);
-                    session.torque_n_m.as_mut().unwrap().push(load);
+                    session.push([
+                        t + row_s + 600.0 * pace,
+                        psi,
+                        *reading - psi / nominal.ratio + noise / ARCSEC_PER_RAD,
+                        load,
+                    ]);
                 }
             }
             session

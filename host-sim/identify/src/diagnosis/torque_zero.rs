@@ -347,21 +347,9 @@ mod tests {
             let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
             let play = 0.5 * nominal.backlash_arcsec * flank;
             let error = nominal.harmonics_arcsec(psi) + wind_up(load) + play + noise;
-            session.line.push(k as u64 + 2);
-            session.generator_rad.push(psi);
-            session.error_rad.push(error / ARCSEC_PER_RAD);
-            session.time_s.as_mut().unwrap().push(t);
-            session.torque_n_m.as_mut().unwrap().push(told);
+            session.push([t, psi, error / ARCSEC_PER_RAD, told]);
         }
-        Recording {
-            file: "made.csv".into(),
-            rows: session.len(),
-            sessions: vec![session],
-            faults: Vec::new(),
-            tooth_steps: Vec::new(),
-            notes: Vec::new(),
-            unusable: None,
-        }
+        Recording::made("made.csv", vec![session])
     }
 
     /// The fault found, and by how much the first torque was changed.

@@ -64,15 +64,7 @@ mod tests {
             error_rad: vec![0.0; 50],
             ..Session::default()
         };
-        Recording {
-            file: "made.csv".into(),
-            rows: 150,
-            sessions: (0..3).map(session).collect(),
-            faults: Vec::new(),
-            tooth_steps: Vec::new(),
-            notes: Vec::new(),
-            unusable: None,
-        }
+        Recording::made("made.csv", (0..3).map(session).collect())
     }
 
     fn zeros(values: [f64; 3]) -> Vec<Parameter> {

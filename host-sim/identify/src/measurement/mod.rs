@@ -434,3 +434,25 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
     };
     if sessions.len() < 2 { vec![whole] } else { sessions.into_iter().map(|rows| whole.part(rows)).collect() }
 }
+
+#[cfg(test)]
+impl Recording {
+    /// Made-up sessions, without a fault.
+    pub(crate) fn made(file: &str, sessions: Vec<Session>) -> Recording {
+        let rows = sessions.iter().map(Session::len).sum();
+        let (faults, tooth_steps, notes) = (Vec::new(), Vec::new(), Vec::new());
+        Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None }
+    }
+}
+
+#[cfg(test)]
+impl Session {
+    /// A row more: time (s), generator and error (rad), torque (N·m); a column that is not there gets none.
+    pub(crate) fn push(&mut self, [time_s, generator_rad, error_rad, torque_n_m]: [f64; 4]) {
+        self.line.push(self.len() as u64 + 2);
+        self.generator_rad.push(generator_rad);
+        self.error_rad.push(error_rad);
+        self.time_s.iter_mut().for_each(|all| all.push(time_s));
+        self.torque_n_m.iter_mut().for_each(|all| all.push(torque_n_m));
+    }
+}

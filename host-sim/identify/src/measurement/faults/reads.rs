@@ -588,10 +588,7 @@ mod tests {
             let is_late = random.f64() < late;
             let off = jitter_s * normal(&mut random) + if is_late { 5e-4 * random.f64().powf(-0.5) } else { 0.0 };
             let error = 12.0 * (2.0 * psi).sin() + 3.0 * (4.0 * psi).sin() + 2.0 * normal(&mut random);
-            session.line.push(k as u64 + 2);
-            session.time_s.as_mut().unwrap().push(t);
-            session.generator_rad.push(psi);
-            session.error_rad.push(error * ARCSEC + off * speed / RATIO);
+            session.push([t, psi, error * ARCSEC + off * speed / RATIO, f64::NAN]);
         }
         session
     }
@@ -633,10 +630,12 @@ mod tests {
             for k in 0..6000u32 {
                 let (off, moved) = (misread * normal(&mut random), real * normal(&mut random));
                 let psi = step_rad * f64::from(k) + moved;
-                session.line.push(u64::from(k) + 2);
-                session.time_s.as_mut().unwrap().push(0.004 * f64::from(k));
-                session.generator_rad.push(psi + off);
-                session.error_rad.push((12.0 * (2.0 * psi).sin() + 2.0 * normal(&mut random)) * ARCSEC - off / RATIO);
+                session.push([
+                    0.004 * f64::from(k),
+                    psi + off,
+                    (12.0 * (2.0 * psi).sin() + 2.0 * normal(&mut random)) * ARCSEC - off / RATIO,
+                    f64::NAN,
+                ]);
             }
             let mut findings = Findings::default();
             check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);
@@ -670,10 +669,7 @@ mod tests {
             let (stop, read) = (f64::from(k / 7), f64::from(k % 7));
             let psi = 0.9 * stop;
             let error = 12.0 * (2.0 * psi).sin() + 2.0 * normal(&mut random);
-            session.line.push(u64::from(k) + 2);
-            session.time_s.as_mut().unwrap().push(1.625 * stop + 0.125 * read);
-            session.generator_rad.push(psi);
-            session.error_rad.push(error * ARCSEC);
+            session.push([1.625 * stop + 0.125 * read, psi, error * ARCSEC, f64::NAN]);
         }
         let mut findings = Findings::default();
         check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);

@@ -122,9 +122,7 @@ mod tests {
             let psi = generator(f64::from(k));
             let noise = (random.f64() + random.f64() + random.f64() - 1.5) * 2.0;
             let output = psi / RATIO + (15.0 * (2.0 * psi).sin() + 1.7 * noise) * ARCSEC;
-            session.line.push(u64::from(k) + 2);
-            session.generator_rad.push(read_as(psi));
-            session.error_rad.push(output - read_as(psi) / RATIO);
+            session.push([f64::NAN, read_as(psi), output - read_as(psi) / RATIO, f64::NAN]);
         }
         session
     }
