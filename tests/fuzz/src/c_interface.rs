@@ -492,7 +492,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
         }
         28 | 29 => {
             let inside = choices.below(8) == 0;
-            let list = if inside { state_at } else { records };
+            let list = if inside { state_at.cast() } else { records };
             let [store, state, recorder] = [store, state, recorder];
             let status = c::flexspline_recorder_see(
                 recorder.pointer.cast(),
