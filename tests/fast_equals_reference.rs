@@ -187,7 +187,8 @@ fn every_imperfection_at_once() {
 #[ignore = "half a minute of a processor: all of them at once are compared always"]
 fn one_imperfection_of_each_kind() {
     let harmonic = |order, amplitude_um| vec![Harmonic { order, amplitude_um, phase_deg: 20.0 }];
-    let changes: [(&str, &dyn Fn(&mut Drive)); 17] = [
+    type Change<'a> = (&'a str, &'a dyn Fn(&mut Drive));
+    let changes: [Change; 17] = [
         ("circular-spline eccentricity", &|d| d.as_built.circular_spline_eccentricity_um = 5.0),
         ("circular-spline ovality", &|d| d.as_built.circular_spline_ovality_um = 5.0),
         ("circular-spline offset", &|d| d.as_built.circular_spline_offset_um = 5.0),
