@@ -213,15 +213,6 @@ fn the_whole_picture_of_a_long_recording_takes_about_a_second() {
     });
     println!("40 000 rows: {seconds:.2} s of processor");
     assert!(seconds < if cfg!(debug_assertions) { 8.0 } else { 4.0 }, "{seconds} s");
-    let by: Vec<&str> = picture.groups.iter().map(|grouping| grouping.by).collect();
-    assert_eq!(by, ["direction", "session", "torque_n_m", "temperature_c", "generator_speed_rad_s"]);
-    // Clearance of 30 arcsec: behind going forward, ahead going back.
-    let [forward, backward] = [0, 1].map(|k| picture.groups[0].groups[k].statistics.median_arcsec);
-    assert!((backward - forward - 30.0).abs() < 3.0, "{forward} {backward}");
-    // Load of 30 N.m winds up by 14 arcsec.
-    let torque = &picture.groups[2].groups;
-    let wound = torque[4].statistics.median_arcsec - torque[0].statistics.median_arcsec;
-    assert!((20.0..32.0).contains(&wound), "{wound}");
     assert!((picture.noise.white_arcsec - 1.0).abs() < 0.15, "{:?}", picture.noise);
     assert_eq!(picture.maps.len(), 6);
     assert!(picture.maps.iter().all(|map| map.bins.iter().all(|bin| bin.count > 0)));

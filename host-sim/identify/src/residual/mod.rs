@@ -1,13 +1,12 @@
 //! The picture before the verdict: what a residual (measured less model) looks like, before anybody says why.
 //!
-//! By direction, load, temperature, speed and session; over the angle of each wheel; its orders with their uncertainty;
-//! pulses that stay in one position; what moves with time; and the noise under all that. Everything is in arc-seconds
-//! at the output, angles in radians, and can be written as JSON.
+//! Over the angle of each wheel, by direction; its orders with their uncertainty; pulses that stay in one position;
+//! what moves with time; and the noise under all that. Everything is in arc-seconds at the output, angles in radians,
+//! and can be written as JSON.
 //!
 //! Three angles matter in a strain wave gear. The contact passes the flexspline once in a generator turn (ψ), the
 //! circular spline once in ψ−δ, which is 94/95 of it for a ratio of 95, and whatever sits on the output turns with δ.
 
-mod groups;
 mod map;
 mod noise;
 mod orders;
@@ -16,7 +15,6 @@ mod rows;
 mod spectrum;
 mod time;
 
-pub(crate) use groups::Grouping;
 pub use map::{AngleMap, Bin};
 pub use noise::Noise;
 pub use orders::{Line, NamedOrder, Wheel, harmonics, named_orders};
@@ -40,8 +38,6 @@ pub struct Picture {
     pub rms_arcsec: f64,
     /// Noise under it.
     pub noise: Noise,
-    /// Statistics by direction, session, and, where recorded, torque, temperature and speed.
-    pub groups: Vec<Grouping>,
     /// Medians over the angles, for each direction.
     pub maps: Vec<AngleMap>,
     /// Orders in ψ, ψ−δ and δ.
@@ -67,10 +63,10 @@ impl Picture {
                 let noise = noise::of(&rows, &centred, &explained);
                 (spectra, noise)
             },
-            || (pulses::find(&rows), (groups::of(&rows), map::of(&rows), time::of(&rows))),
+            || (pulses::find(&rows), (map::of(&rows), time::of(&rows))),
         );
-        let (groups, maps, drift) = rest;
+        let (maps, drift) = rest;
         let count = rows.value.len();
-        Ok(Picture { rows: count, rms_arcsec: rms(&rows.value), noise, groups, maps, spectra, pulses, drift })
+        Ok(Picture { rows: count, rms_arcsec: rms(&rows.value), noise, maps, spectra, pulses, drift })
     }
 }

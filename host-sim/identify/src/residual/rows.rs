@@ -129,28 +129,4 @@ impl<'a> Rows<'a> {
         let (backward, forward) = (median(false), median(true));
         self.value.iter().zip(&self.forward).map(|(value, f)| value - if *f { forward } else { backward }).collect()
     }
-
-    /// A column that all sessions have.
-    pub(crate) fn column(&self, of: impl Fn(&'a Session) -> Option<&'a Vec<f64>>) -> Option<Vec<f64>> {
-        let mut all = Vec::with_capacity(self.value.len());
-        for session in self.sessions {
-            all.extend_from_slice(of(session)?);
-        }
-        (!all.is_empty()).then_some(all)
-    }
-
-    /// Size of the generator speed, rad/s, over five rows before and after.
-    pub fn speed(&self) -> Option<Vec<f64>> {
-        let mut all = Vec::with_capacity(self.value.len());
-        for session in self.sessions {
-            let time = session.time_s.as_ref()?;
-            for row in 0..session.len() {
-                let (from, to) = (row.saturating_sub(5), (row + 5).min(session.len() - 1));
-                let dt = time[to] - time[from];
-                let moved = session.generator_rad[to] - session.generator_rad[from];
-                all.push(if dt > 0.0 { (moved / dt).abs() } else { 0.0 });
-            }
-        }
-        (!all.is_empty()).then_some(all)
-    }
 }
