@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
+use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::measurement::{ColumnMap, Gear, Session, parse, read};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::{Axis, Picture, harmonics};
@@ -50,8 +51,10 @@ fn the_csf17_has_its_orders() {
     let (constant, lines) = harmonics(&session.generator_rad, &error, &[2.0]).unwrap();
     assert!((left(&lines, constant) - 6.09).abs() < 0.01, "{}", left(&lines, constant));
     // Without given orders: two waves a turn, and that the wheels are not distinguishable in 2.5 turns.
-    let residual = vec![session.error_rad.clone()];
-    let picture = Picture::of(&[session], &residual, &Gear::of_teeth(200, 202, true)).unwrap();
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");
+    let model = std::fs::read_to_string(format!("{example}/nominal.toml")).unwrap();
+    let nominal = Nominal::from_toml("nominal.toml", &model).unwrap();
+    let picture = Picture::of(&Rows::new(&[session], &nominal), &error, nominal.ratio).unwrap();
     let spectrum = &picture.spectra[0];
     assert_eq!(spectrum.axis, Axis::Generator);
     let peak = &spectrum.peaks[0];
@@ -149,8 +152,8 @@ fn the_csf17_has_more_than_two_waves_and_nothing_is_invented_for_the_rest() {
     for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
         *error -= nominal.harmonics_arcsec(*psi) / ARCSEC_PER_RAD;
     }
-    let residual = vec![session.error_rad.clone()];
-    let picture = Picture::of(&[session], &residual, &Gear::of_ratio(nominal.ratio)).unwrap();
+    let rows = Rows::new(&[session], &nominal);
+    let picture = Picture::of(&rows, &rows.error, nominal.ratio).unwrap();
     // What the picture of the nominal model shows: a hump at once a turn. In 2.5 turns it is no line above noise that
     // remembers.
     let spectrum = &picture.spectra[0];

@@ -4,8 +4,11 @@
 use std::f64::consts::TAU;
 
 use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
-use flexspline_identify::measurement::{Gear, Session};
-use flexspline_identify::residual::{Axis, OrderSpectrum, Picture, Wheel, harmonics, order_spectrum};
+use flexspline_identify::diagnosis::rows::Rows;
+use flexspline_identify::measurement::Session;
+use flexspline_identify::nominal::Nominal;
+use flexspline_identify::residual::{Axis, OrderSpectrum, Picture, SizeMismatch, Wheel, harmonics, order_spectrum};
+use flexspline_identify::synthesize::catalogue_drive;
 use flexspline_tests::seeds;
 
 const CIRCULAR_SPLINE: f64 = 94.0 / 95.0;
@@ -135,6 +138,13 @@ fn noise_shows_no_line_white_or_wandering() {
     assert!(alarms.len() as f64 <= 0.01 * seeds as f64, "{} of {seeds}\n{}", alarms.len(), alarms.join("\n"));
 }
 
+/// The picture of a residual, rad, one value for each row of the sessions.
+fn picture(sessions: &[Session], residual_rad: &[f64]) -> Result<Picture, SizeMismatch> {
+    let nominal = Nominal { ratio: RATIO, teeth: None, ..catalogue_drive() };
+    let residual_arcsec: Vec<f64> = residual_rad.iter().map(|value| value / ARCSEC).collect();
+    Picture::of(&Rows::new(sessions, &nominal), &residual_arcsec, RATIO)
+}
+
 fn session(angle: Vec<f64>) -> Session {
     let rows = angle.len();
     Session {
@@ -172,14 +182,14 @@ fn a_damaged_tooth_is_a_pulse_in_its_place_and_a_clean_drive_has_none() {
         };
         let (damaged, sound) = (make(12.0), make(0.0));
         let sessions = [session(angle.clone())];
-        let picture = Picture::of(&sessions, &[damaged], &Gear::of_ratio(RATIO)).unwrap();
-        assert_eq!(picture.pulses.len(), 1, "seed {seed}");
-        let pulse = picture.pulses[0];
+        let pulses = picture(&sessions, &damaged).unwrap().pulses;
+        assert_eq!(pulses.len(), 1, "seed {seed}");
+        let pulse = pulses[0];
         let off = (pulse.position_rad - at + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
         let axis = if circular { Axis::GeneratorLessOutput } else { Axis::Generator };
         assert!(pulse.axis == axis && pulse.per_turn == 1, "seed {seed}: {pulse:?}");
         assert!(off.abs() < 0.06 && (pulse.height_arcsec - 12.0).abs() < 2.5, "seed {seed}, at {at}: {pulse:?}");
-        clean += Picture::of(&sessions, &[sound], &Gear::of_ratio(RATIO)).unwrap().pulses.len();
+        clean += picture(&sessions, &sound).unwrap().pulses.len();
     }
     // One in sixty.
     assert!(60 * clean as u64 <= seeds, "{clean} pulses in {seeds} clean drives");
@@ -203,12 +213,12 @@ fn the_whole_picture_of_a_long_recording_takes_about_a_second() {
             }
         })
         .collect();
-    let residual: Vec<Vec<f64>> = sessions.iter().map(|session| session.error_rad.clone()).collect();
+    let residual: Vec<f64> = sessions.iter().flat_map(|session| session.error_rad.clone()).collect();
     // Of the processor, all of it on one thread: other programs and other claims do not count.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let (picture, seconds) = alone.install(|| {
         let begun = thread_s();
-        let picture = Picture::of(&sessions, &residual, &Gear::of_teeth(188, 190, true)).unwrap();
+        let picture = picture(&sessions, &residual).unwrap();
         (picture, thread_s() - begun)
     });
     println!("40 000 rows: {seconds:.2} s of processor");
@@ -233,7 +243,7 @@ fn the_memory_of_the_noise_is_found_under_the_lines() {
             (20.0 * (2.0 * x).sin() + wander + normal(&mut random)) * ARCSEC
         })
         .collect();
-    let noise = Picture::of(&[session(angle)], &[residual], &Gear::of_ratio(RATIO)).unwrap().noise;
+    let noise = picture(&[session(angle)], &residual).unwrap().noise;
     println!("{noise:?}");
     assert!((noise.white_arcsec - 1.0).abs() < 0.1 && (noise.correlated_arcsec - 3.0).abs() < 0.6, "{noise:?}");
     // 9/10 of the variance has a memory of 199 rows, 1/10 none.
@@ -245,14 +255,14 @@ fn the_memory_of_the_noise_is_found_under_the_lines() {
 fn little_data_gives_an_empty_picture_and_no_nonsense() {
     for rows in [0, 1, 2, 17] {
         let sessions = [session((0..rows).map(|k| k as f64 * 0.1).collect())];
-        let picture = Picture::of(&sessions, &[vec![1e-5; rows]], &Gear::of_ratio(RATIO)).unwrap();
+        let picture = picture(&sessions, &vec![1e-5; rows]).unwrap();
         assert_eq!(picture.rows, rows);
         assert!(picture.spectra.iter().all(|spectrum| spectrum.peaks.is_empty()));
         assert!(picture.noise.white_arcsec == 0.0 && picture.noise.independent_rows.is_finite());
     }
     let still = [session(vec![1.0; 100])];
-    assert!(Picture::of(&still, &[vec![0.0; 100]], &Gear::of_ratio(RATIO)).unwrap().pulses.is_empty());
-    let error = Picture::of(&still, &[vec![0.0; 99]], &Gear::of_ratio(RATIO)).unwrap_err();
-    assert_eq!(error.to_string(), "session 0: 99 values of the residual for 100 rows");
+    assert!(picture(&still, &[0.0; 100]).unwrap().pulses.is_empty());
+    let error = picture(&still, &[0.0; 99]).unwrap_err();
+    assert_eq!(error.to_string(), "99 values of the residual for 100 rows");
     assert_eq!(harmonics(&[], &[], &[2.0]), None);
 }

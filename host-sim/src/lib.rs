@@ -87,14 +87,16 @@
 //! # Read it and see its error
 //!
 //! ```
-//! use flexspline_sim::{Gear, Picture};
+//! use flexspline_sim::{Gear, Nominal, Picture, Rows};
 //! # use flexspline_sim::{ColumnMap, read_log};
 //! # let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! # let file = "../examples/csf17_100/error_vs_input.csv";
 //!
 //! let log = read_log(file.as_ref(), &columns, &Gear::of_ratio(100.0))?;
-//! let errors: Vec<Vec<f64>> = log.sessions.iter().map(|session| session.error_rad.clone()).collect();
-//! let picture = Picture::of(&log.sessions, &errors, &Gear::of_ratio(100.0))?;
+//! let model = "../examples/csf17_100/nominal.toml";
+//! let nominal = Nominal::from_toml(model, &std::fs::read_to_string(model)?)?;
+//! let rows = Rows::new(&log.sessions, &nominal);
+//! let picture = Picture::of(&rows, &rows.error, nominal.ratio)?;
 //! // Two waves a generator turn, 21 arcsec.
 //! let largest = &picture.spectra[0].peaks[0];
 //! assert!((largest.order - 2.0).abs() < 0.1 && (largest.amplitude_arcsec - 21.0).abs() < 1.0);
@@ -189,6 +191,7 @@ pub use flexspline_design::tables::{
 };
 
 // Read measured data.
+pub use flexspline_identify::diagnosis::rows::Rows;
 pub use flexspline_identify::look::{Looked, look};
 pub use flexspline_identify::measurement::{
     ColumnMap, Fault, Gear, MappingError, MeasuredError, Recording, Session, parse as parse_log, raw, read as read_log,

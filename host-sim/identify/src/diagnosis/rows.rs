@@ -1,12 +1,12 @@
 //! The rows of all sessions in one place, with what follows from them: speed, direction, travel, and angles on each
 //! wheel.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 pub(crate) use crate::measurement::rms;
 use crate::measurement::{Session, neighbours, quantile_of, rates};
 use crate::nominal::{Fixed, Nominal};
-use crate::residual::sampled_twice;
 pub(super) use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -267,8 +267,15 @@ impl Rows {
     }
 }
 
+/// Highest order per turn of which a share of the steps (rad, which are reordered) sees each wave twice or more; no
+/// limit without steps.
+pub(crate) fn sampled_twice(steps: &mut [f64], share: f64) -> f64 {
+    let step = quantile_of(steps, share);
+    if step > 0.0 { PI / step } else { f64::INFINITY }
+}
+
 /// A session in parts of `stride` rows (at least one); the last may be shorter.
-pub(super) fn parts(session: &Range<usize>, stride: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+pub(crate) fn parts(session: &Range<usize>, stride: usize) -> impl Iterator<Item = Range<usize>> + use<> {
     let (stride, end) = (stride.max(1), session.end);
     session.clone().step_by(stride).map(move |from| from..(from + stride).min(end))
 }

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::rows::{Axis, Direction, Rows};
-use crate::measurement::median_and_std;
+use super::rows::{Axis, Direction, Residual};
+use crate::measurement::median_of;
 
 /// Bins of a turn: 3 degrees, a third of the arc over which teeth engage.
 const BINS: usize = 120;
@@ -19,8 +19,6 @@ pub struct Bin {
     pub count: usize,
     /// Their median, arcsec.
     pub median_arcsec: f64,
-    /// Their robust standard deviation, arcsec.
-    pub spread_arcsec: f64,
 }
 
 /// The residual over an angle, in one direction of motion.
@@ -34,15 +32,15 @@ pub struct AngleMap {
     pub bins: Vec<Bin>,
 }
 
-pub(super) fn of(rows: &Rows) -> Vec<AngleMap> {
+pub(super) fn of(residual: &Residual<'_>) -> Vec<AngleMap> {
     let mut maps = Vec::new();
     for axis in Axis::ALL {
-        let angle = rows.within_turn(axis);
+        let angle = residual.angle(axis);
         for direction in [Direction::Forward, Direction::Backward] {
             let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
-            for row in 0..angle.len() {
-                if rows.forward[row] == (direction == Direction::Forward) {
-                    bins[((angle[row] / TAU * BINS as f64) as usize).min(BINS - 1)].push(rows.value[row]);
+            for (row, angle) in angle.iter().enumerate() {
+                if residual.forward[row] == (direction == Direction::Forward) {
+                    bins[bin_of(*angle, BINS)].push(residual.value[row]);
                 }
             }
             let bins: Vec<Bin> = bins
@@ -50,10 +48,8 @@ pub(super) fn of(rows: &Rows) -> Vec<AngleMap> {
                 .enumerate()
                 .filter(|(_, values)| !values.is_empty())
                 .map(|(place, values)| {
-                    let count = values.len();
-                    let (median_arcsec, spread_arcsec) = median_and_std(values);
                     let angle_rad = (place as f64 + 0.5) / BINS as f64 * TAU;
-                    Bin { angle_rad, count, median_arcsec, spread_arcsec }
+                    Bin { angle_rad, count: values.len(), median_arcsec: median_of(values) }
                 })
                 .collect();
             if !bins.is_empty() {
@@ -62,4 +58,9 @@ pub(super) fn of(rows: &Rows) -> Vec<AngleMap> {
         }
     }
     maps
+}
+
+/// Which of the bins of a turn an angle (rad) lies in.
+pub(super) fn bin_of(angle: f64, bins: usize) -> usize {
+    ((angle.rem_euclid(TAU) / TAU * bins as f64) as usize).min(bins - 1)
 }

@@ -20,14 +20,14 @@ pub use noise::Noise;
 pub use orders::{Line, NamedOrder, Wheel, harmonics, named_orders};
 pub(crate) use pulses::Pulse;
 pub use rows::{Axis, Direction, SizeMismatch};
-pub(crate) use spectrum::sampled_twice;
 pub use spectrum::{OrderSpectrum, Peak, order_spectrum};
 pub(crate) use time::SessionDrift;
 
 use serde::Serialize;
 
-use crate::measurement::{Gear, Session, rms};
-use rows::Rows;
+use crate::diagnosis::rows::Rows;
+use crate::measurement::rms;
+use rows::Residual;
 
 /// The picture of a residual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,24 +49,26 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The picture of `residual_rad`, one value for each row of each session.
-    pub fn of(sessions: &[Session], residual_rad: &[Vec<f64>], gear: &Gear) -> Result<Picture, SizeMismatch> {
-        let rows = Rows::new(sessions, residual_rad, gear.ratio)?;
+    /// The picture of a residual over the rows of a drive with this ratio: arcsec, one value for each row.
+    ///
+    /// # Errors
+    /// There are more values than rows, or fewer.
+    pub fn of(rows: &Rows, residual_arcsec: &[f64], ratio: f64) -> Result<Picture, SizeMismatch> {
+        let residual = Residual::new(rows, residual_arcsec)?;
         let ((spectra, noise), (pulses, rest)) = rayon::join(
             || {
-                let centred = rows.centred_by_direction();
+                let centred = residual.centred_by_direction();
                 let spectra: Vec<OrderSpectrum> = Axis::ALL
                     .into_iter()
-                    .map(|axis| order_spectrum(axis, &rows.angle(axis), &centred, gear.ratio))
+                    .map(|axis| order_spectrum(axis, &residual.angle(axis), &centred, ratio))
                     .collect();
                 let explained = spectra.first().map_or_else(Vec::new, |spectrum| spectrum.lines());
-                let noise = noise::of(&rows, &centred, &explained);
+                let noise = noise::of(rows, &centred, &explained);
                 (spectra, noise)
             },
-            || (pulses::find(&rows), (map::of(&rows), time::of(&rows))),
+            || (pulses::find(&residual), (map::of(&residual), time::of(&residual))),
         );
         let (maps, drift) = rest;
-        let count = rows.value.len();
-        Ok(Picture { rows: count, rms_arcsec: rms(&rows.value), noise, maps, spectra, pulses, drift })
+        Ok(Picture { rows: rows.len(), rms_arcsec: rms(residual_arcsec), noise, maps, spectra, pulses, drift })
     }
 }

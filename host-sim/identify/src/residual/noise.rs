@@ -4,7 +4,7 @@ use flexspline_algebra::{spectrum, values_of};
 use serde::Serialize;
 
 use super::orders::Line;
-use super::rows::Rows;
+use crate::diagnosis::rows::Rows;
 use crate::measurement::{median_and_std, sampled, white_noise};
 
 /// The sum of correlations is taken up to this many times itself (Sokal's window).
@@ -26,8 +26,7 @@ pub struct Noise {
 
 /// `lines` are sines of the generator angle that are taken out first.
 pub(super) fn of(rows: &Rows, centred: &[f64], lines: &[Line]) -> Noise {
-    let sessions: Vec<&[f64]> = rows.starts.windows(2).map(|bounds| &centred[bounds[0]..bounds[1]]).collect();
-    let white = white_noise(sessions.iter().copied());
+    let white = white_noise(rows.sessions.iter().map(|session| &centred[session.clone()]));
     let mut left: Vec<f64> = centred
         .iter()
         .zip(&rows.generator)

@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde::Serialize;
 
-use super::rows::{Axis, Rows};
+use super::map::bin_of;
+use super::rows::{Axis, Residual};
 use crate::least_squares::Normal;
 use crate::measurement::{least_and_most, median_and_std};
 
@@ -37,9 +38,9 @@ pub struct Pulse {
     pub height_std_arcsec: f64,
 }
 
-pub(super) fn find(rows: &Rows) -> Vec<Pulse> {
+pub(super) fn find(residual: &Residual<'_>) -> Vec<Pulse> {
     let mut found: Vec<Pulse> =
-        [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(rows, axis)).collect();
+        [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(residual, axis)).collect();
     // Both wheels turn almost alike: a pulse of one is a shadow on the other. The sharper one is meant.
     let score = |pulse: &Pulse| (pulse.height_arcsec / pulse.height_std_arcsec).abs();
     if found.len() == 2 {
@@ -49,13 +50,13 @@ pub(super) fn find(rows: &Rows) -> Vec<Pulse> {
     found
 }
 
-fn on(rows: &Rows, axis: Axis) -> Option<Pulse> {
-    let angle = rows.angle(axis);
+fn on(residual: &Residual<'_>, axis: Axis) -> Option<Pulse> {
+    let angle = residual.angle(axis);
     let (low, high) = least_and_most(angle.iter().copied());
     if high - low < FEWEST_TURNS * TAU {
         return None;
     }
-    let centred = rows.centred_by_direction();
+    let centred = residual.centred_by_direction();
     // First and second half of the rows by themselves: a pulse is in both.
     let half = angle.len() / 2;
     let whole = folded(&angle, &centred);
@@ -78,7 +79,7 @@ fn on(rows: &Rows, axis: Axis) -> Option<Pulse> {
 fn folded(angle: &[f64], value: &[f64]) -> Vec<(f64, f64)> {
     let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
     for (angle, value) in angle.iter().zip(value) {
-        bins[((angle.rem_euclid(TAU) / TAU * BINS as f64) as usize).min(BINS - 1)].push(*value);
+        bins[bin_of(*angle, BINS)].push(*value);
     }
     bins.iter_mut().map(|values| (median_and_std(values).0, values.len() as f64)).collect()
 }

@@ -1,11 +1,10 @@
-//! All rows of all sessions one after another, with the angles that matter.
-
-use std::f64::consts::TAU;
+//! A residual with the angles that it may be tied to.
 
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::measurement::{Session, directions, median_of, sampled};
+use crate::diagnosis::rows::Rows;
+use crate::measurement::{directions, median_of, sampled};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// An angle that something may be tied to.
@@ -47,86 +46,53 @@ pub enum Direction {
 
 /// A residual that does not have one value for each row.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("session {session}: {found} values of the residual for {needed} rows")]
+#[error("{found} values of the residual for {needed} rows")]
 pub struct SizeMismatch {
-    /// Session, from 0.
-    pub session: usize,
     /// Values found.
     pub found: usize,
     /// Rows.
     pub needed: usize,
 }
 
-/// Rows of all sessions.
-pub(super) struct Rows<'a> {
-    pub sessions: &'a [Session],
-    /// Where each session begins, and where the last one ends.
-    pub starts: Vec<usize>,
-    /// Residual, arcsec.
-    pub value: Vec<f64>,
-    /// Generator angle, rad.
-    pub generator: Vec<f64>,
-    /// Output angle, rad.
+/// A residual over the rows.
+pub(super) struct Residual<'a> {
+    pub rows: &'a Rows,
+    /// One value for each row, arcsec.
+    pub value: &'a [f64],
+    /// Measured output angle, rad.
     pub output: Vec<f64>,
-    /// Direction of motion.
+    /// Whether the generator moves forward, or moved so last.
     pub forward: Vec<bool>,
 }
 
-impl<'a> Rows<'a> {
-    pub fn new(sessions: &'a [Session], residual_rad: &[Vec<f64>], ratio: f64) -> Result<Self, SizeMismatch> {
-        let mut rows = Rows {
-            sessions,
-            starts: vec![0],
-            value: Vec::new(),
-            generator: Vec::new(),
-            output: Vec::new(),
-            forward: Vec::new(),
-        };
-        for (number, session) in sessions.iter().enumerate() {
-            let found = residual_rad.get(number).map_or(0, Vec::len);
-            if found != session.len() {
-                return Err(SizeMismatch { session: number, found, needed: session.len() });
-            }
-            rows.value.extend(residual_rad[number].iter().map(|value| value * ARCSEC_PER_RAD));
-            rows.generator.extend_from_slice(&session.generator_rad);
-            rows.output.extend(session.output_rad(ratio));
-            rows.forward.extend(directions(&session.generator_rad).into_iter().map(|way| way > 0.0));
-            rows.starts.push(rows.value.len());
+impl<'a> Residual<'a> {
+    pub fn new(rows: &'a Rows, value: &'a [f64]) -> Result<Self, SizeMismatch> {
+        if value.len() != rows.len() {
+            return Err(SizeMismatch { found: value.len(), needed: rows.len() });
         }
-        Ok(rows)
+        let output = rows.output.iter().zip(&rows.error).map(|(nominal, error)| nominal + error / ARCSEC_PER_RAD);
+        let directions = rows.sessions.iter().flat_map(|session| directions(&rows.generator[session.clone()]));
+        let forward = directions.map(|way| way > 0.0).collect();
+        Ok(Residual { rows, value, output: output.collect(), forward })
     }
 
     /// The angle of an axis, rad.
     pub fn angle(&self, axis: Axis) -> Vec<f64> {
+        let generator = &self.rows.generator;
         match axis {
-            Axis::Generator => self.generator.clone(),
+            Axis::Generator => generator.clone(),
             Axis::Output => self.output.clone(),
-            Axis::GeneratorLessOutput => {
-                self.generator.iter().zip(&self.output).map(|(psi, delta)| psi - delta).collect()
-            }
+            Axis::GeneratorLessOutput => generator.iter().zip(&self.output).map(|(psi, delta)| psi - delta).collect(),
         }
     }
 
-    /// The angle of an axis within a turn, 0 to 2π.
-    pub(crate) fn within_turn(&self, axis: Axis) -> Vec<f64> {
-        let mut angle = self.angle(axis);
-        angle.iter_mut().for_each(|angle| *angle = angle.rem_euclid(TAU));
-        angle
-    }
-
     /// The residual less its median in each direction.
-    pub(crate) fn centred_by_direction(&self) -> Vec<f64> {
-        let median = |direction: bool| {
-            let some: Vec<f64> = self
-                .value
-                .iter()
-                .zip(&self.forward)
-                .filter(|(_, f)| **f == direction)
-                .map(|(value, _)| *value)
-                .collect();
-            median_of(&mut sampled(&some))
-        };
-        let (backward, forward) = (median(false), median(true));
-        self.value.iter().zip(&self.forward).map(|(value, f)| value - if *f { forward } else { backward }).collect()
+    pub fn centred_by_direction(&self) -> Vec<f64> {
+        let values = || self.value.iter().copied().zip(&self.forward);
+        let [backward, forward] = [false, true].map(|way| {
+            let of_way: Vec<f64> = values().filter(|(_, forward)| **forward == way).map(|(value, _)| value).collect();
+            median_of(&mut sampled(&of_way))
+        });
+        values().map(|(value, is_forward)| value - if *is_forward { forward } else { backward }).collect()
     }
 }

@@ -13,7 +13,8 @@ use serde::Serialize;
 
 use super::orders::{Line, NamedOrder, confusion, harmonics, named_orders};
 use super::rows::Axis;
-use crate::measurement::{least_and_most, median_of, quantile_of, sampled};
+use crate::diagnosis::rows::sampled_twice;
+use crate::measurement::{least_and_most, median_of, sampled};
 
 /// Cells in the shortest wave.
 const CELLS_PER_WAVE: f64 = 10.0;
@@ -52,8 +53,6 @@ pub struct Peak {
     pub order: f64,
     /// Its standard deviation.
     pub order_std: f64,
-    /// Waves in a generator turn.
-    pub per_generator_turn: f64,
     /// Amplitude, arcsec.
     pub amplitude_arcsec: f64,
     /// Phase of `amplitude * sin(order * angle + phase)`, rad.
@@ -62,8 +61,6 @@ pub struct Peak {
     pub amplitude_std_arcsec: f64,
     /// Standard deviation of the phase, rad.
     pub phase_std_rad: f64,
-    /// Chance that noise gives such a line anywhere in the spectrum.
-    pub false_alarm: f64,
     /// Orders of the drive within the resolution; more than one: they cannot be distinguished.
     pub named: Vec<NamedOrder>,
 }
@@ -98,13 +95,6 @@ impl OrderSpectrum {
         };
         self.peaks.iter().map(line).collect()
     }
-}
-
-/// Highest order per turn of which a share of the steps (rad, which are reordered) sees each wave twice or more; no
-/// limit without steps.
-pub(crate) fn sampled_twice(steps: &mut [f64], share: f64) -> f64 {
-    let step = quantile_of(steps, share);
-    if step > 0.0 { PI / step } else { f64::INFINITY }
 }
 
 /// The spectrum of `value` (arcsec) along `angle` (rad), an `axis` of a drive with this ratio. Orders below one wave in
@@ -177,7 +167,7 @@ pub fn order_spectrum(axis: Axis, angle: &[f64], value: &[f64], ratio: f64) -> O
             found = lines.iter().filter(|line| stands(line)).map(|line| line.order).collect();
         }
     }
-    let peaks = peaks(axis, angle, value, ratio, &found, &orders, &noise, waves, resolution);
+    let peaks = peaks(axis, angle, value, ratio, &found, &orders, &noise, resolution);
     let (orders, amplitude_arcsec, level_arcsec) = thinned(&orders, &first, &noise, times);
     OrderSpectrum { axis, turns, resolution, orders, amplitude_arcsec, level_arcsec, peaks }
 }
@@ -191,7 +181,6 @@ fn peaks(
     found: &[f64],
     orders: &[f64],
     noise: &[f64],
-    waves: f64,
     resolution: f64,
 ) -> Vec<Peak> {
     let Some((_, lines)) = harmonics(angle, value, found) else { return Vec::new() };
@@ -208,16 +197,13 @@ fn peaks(
             let per_generator_turn = line.order * turns_of_axis;
             let near =
                 |named: &NamedOrder| (named.per_generator_turn - per_generator_turn).abs() < resolution * turns_of_axis;
-            let excess = line.amplitude.powi(2) / noise[at];
             Peak {
                 order: line.order,
                 order_std: 3.0_f64.sqrt() * resolution / PI * std / line.amplitude,
-                per_generator_turn,
                 amplitude_arcsec: line.amplitude,
                 phase_rad: line.phase_rad,
                 amplitude_std_arcsec: std,
                 phase_std_rad: std / line.amplitude,
-                false_alarm: (MAXIMA * waves.max(1.0) * (-excess).exp()).min(1.0),
                 named: named_orders(ratio).into_iter().filter(near).collect(),
             }
         })

@@ -10,8 +10,6 @@ mod thin;
 mod why;
 mod words;
 
-use std::borrow::Cow;
-
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -20,13 +18,12 @@ use super::page::{
     significant,
 };
 use flexspline_base::robust::least_and_most;
-use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
 use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Unexplained, Verdict};
 use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::diagnosis::{Extended, Series, WrittenTable};
-use flexspline_identify::measurement::{Fault, Gear, Recording, Session, ToothStep};
+use flexspline_identify::measurement::{Fault, Recording, Session, ToothStep};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::Picture;
 use thin::Clock;
@@ -118,24 +115,12 @@ struct DiagnosisKnown<'a> {
 pub fn page(mut sources: DiagnosisSources<'_>) -> Page {
     let (nominal, recording) = (sources.nominal, sources.recording);
     let rows = Rows::new(&recording.sessions, nominal);
-    let mut sessions: Cow<'_, [Session]> = Cow::Borrowed(&recording.sessions);
-    if recording.sessions.iter().any(|session| session.len() <= 3) {
-        sessions = recording.sessions.iter().filter(|session| session.len() > 3).cloned().collect();
-    }
     let mut levels = std::mem::take(&mut sources.levels);
     levels.retain(|level| level.residual_arcsec.len() == rows.len());
     sources.parts.retain(|part| part.adds_arcsec.len() == rows.len());
-    let gear = Gear::of_ratio(nominal.ratio);
     let shown = levels
         .into_par_iter()
-        .map(|level| {
-            let in_rad: Vec<Vec<f64>> = rows
-                .sessions
-                .iter()
-                .map(|s| level.residual_arcsec[s.clone()].iter().map(|e| e / ARCSEC_PER_RAD).collect())
-                .collect();
-            Shown { picture: Picture::of(&sessions, &in_rad, &gear).ok(), level }
-        })
+        .map(|level| Shown { picture: Picture::of(&rows, &level.residual_arcsec, nominal.ratio).ok(), level })
         .collect();
     DiagnosisKnown { clock: Clock::new(&rows), rows, shown, sources }.page()
 }

@@ -305,9 +305,8 @@ impl DiagnosisKnown<'_> {
             let drift = &shown.picture.as_ref()?.drift;
             let mut parts: [Vec<[f64; 2]>; 3] = Default::default();
             for session in drift {
-                let Some(begin) = self.clock.begins.get(session.session) else { continue };
-                let first = rows.sessions.get(session.session).map_or(0, |s| s.start);
-                let start = if session.unit == "s" { rows.time[first] } else { 0.0 };
+                let first = rows.sessions.get(session.session).and_then(|of_it| rows.time.get(of_it.start));
+                let (Some(begin), Some(start)) = (self.clock.begins.get(session.session), first) else { continue };
                 for (k, shift) in [0.0, 1.0, -1.0].into_iter().enumerate() {
                     if let Some([x, _]) = parts[k].last().copied() {
                         parts[k].push([0.5 * (x + begin), f64::NAN]);
