@@ -74,10 +74,22 @@ impl FreeSpan {
     pub(crate) fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
         for free in &self.0 {
             let share = dot(&column, free);
-            column.iter_mut().zip(free).for_each(|(left, v)| *left -= share * v);
+            add_scaled(&mut column, free, -share);
         }
         column
     }
+}
+
+/// Sum of columns of this length, each times its coefficient.
+pub(crate) fn combined<'c>(len: usize, columns: impl IntoIterator<Item = &'c [f64]>, coefficients: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; len];
+    columns.into_iter().zip(coefficients).for_each(|(column, c)| add_scaled(&mut sum, column, *c));
+    sum
+}
+
+/// Adds a column times a coefficient.
+pub(crate) fn add_scaled(sum: &mut [f64], column: &[f64], coefficient: f64) {
+    sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += coefficient * value);
 }
 
 /// Standard deviation of a value, from the values without one block of the rows at a time (jackknife).

@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+pub(crate) use crate::least_squares::{add_scaled, combined};
 pub(crate) use crate::measurement::rms;
 use crate::measurement::{Session, neighbours, quantile_of, rates};
 use crate::nominal::{Fixed, Nominal};
@@ -278,18 +279,6 @@ pub(crate) fn sampled_twice(steps: &mut [f64], share: f64) -> f64 {
 pub(crate) fn parts(session: &Range<usize>, stride: usize) -> impl Iterator<Item = Range<usize>> + use<> {
     let (stride, end) = (stride.max(1), session.end);
     session.clone().step_by(stride).map(move |from| from..(from + stride).min(end))
-}
-
-/// Sum of columns of this length, each times its coefficient.
-pub(super) fn combined<'c>(len: usize, columns: impl IntoIterator<Item = &'c [f64]>, coefficients: &[f64]) -> Vec<f64> {
-    let mut sum = vec![0.0; len];
-    columns.into_iter().zip(coefficients).for_each(|(column, c)| add_scaled(&mut sum, column, *c));
-    sum
-}
-
-/// Adds a column times a coefficient.
-pub(super) fn add_scaled(sum: &mut [f64], column: &[f64], coefficient: f64) {
-    sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += coefficient * value);
 }
 
 /// Quantile of those numbers that are finite; 0 of none.

@@ -6,13 +6,13 @@
 
 use std::sync::OnceLock;
 
-use flexspline_algebra::{Mat, cholesky, lower_of_product, product};
-
 use super::WIDEST_CLEARANCE_RAD;
 use super::steps::largest_torque;
+use crate::least_squares::add_scaled;
+use crate::linear::{Gram, Prior, solve};
 use crate::measurement::gear::Gear;
 use crate::measurement::{Session, directions};
-use flexspline_base::robust::median_and_std;
+use flexspline_base::robust::{median_and_std, rms};
 
 /// Rows that a fit uses at most, spread evenly. *Guess*: it bounds the time.
 const FIT_ROWS: usize = 8000;
@@ -21,6 +21,11 @@ const BEFORE: usize = 5;
 /// Weights fall from this many robust standard deviations on (Huber 1964). *Guess*: he takes 1 to 2; with 2.5 nearly
 /// all normal rows keep their weight.
 const HUBER: f64 = 2.5;
+/// Prior standard deviation of a coefficient, in units of what one row of error 1 says of it: so wide that rows alone
+/// decide, where they do. *Guess*: 1e-9 of their information.
+const WIDE: f64 = 31_622.776_601_683_8;
+/// A column is at least of this size, in its own unit. *Guess*: smaller is round-off.
+const LEAST_SIZE: f64 = 1e-12;
 
 /// Columns that depend on the state.
 pub(super) struct StateModel<'a> {
@@ -182,44 +187,25 @@ impl<'a> StateModel<'a> {
     pub fn fit(&self, extras: &[Extra]) -> Option<StateFit> {
         let SampledRows { places, error, columns } = self.sampled.get_or_init(|| self.sample());
         let n = error.len();
-        let width = columns.len() + extras.len();
-        if n < 2 * width {
+        let extra_column = |extra: &Extra| places.iter().map(|(session, row)| extra(*session, *row)).collect();
+        let extra_columns: Vec<Vec<f64>> = extras.iter().map(extra_column).collect();
+        let all: Vec<&[f64]> = columns.iter().chain(&extra_columns).map(Vec::as_slice).collect();
+        if n < 2 * all.len() {
             return None;
         }
-        let mut table = Mat::zeros(n, width);
-        for (c, column) in columns.iter().enumerate() {
-            table.col_as_slice_mut(c).copy_from_slice(column);
-        }
-        for (c, extra) in extras.iter().enumerate() {
-            let column = table.col_as_slice_mut(columns.len() + c);
-            column.iter_mut().zip(places).for_each(|(value, (session, row))| *value = extra(*session, *row));
-        }
-        // Columns of one size, so that one small ridge suits all of them.
-        let size: Vec<f64> = (0..width)
-            .map(|c| {
-                let column = table.col_as_slice_mut(c);
-                let size = (column.iter().map(|x| x * x).sum::<f64>() / n as f64).sqrt().max(1e-300);
-                column.iter_mut().for_each(|x| *x /= size);
-                size
-            })
-            .collect();
-        let errors = Mat::from_fn(n, 1, |i, _| error[i]);
+        let wide = |column: &&[f64]| WIDE / (n as f64).sqrt() / rms(column).max(LEAST_SIZE);
+        let priors: Vec<Prior> = all.iter().map(|column| Prior { mean: 0.0, std: wide(column) }).collect();
         let mut weight = vec![1.0; n];
-        let (mut value, mut inverse, mut left, mut sigma) = (vec![0.0; width], Mat::zeros(0, 0), error.clone(), 0.0);
+        let (mut solution, mut left, mut sigma) = (None, error.clone(), 0.0);
         for _ in 0..4 {
-            let mut weighted = table.clone();
-            for c in 0..width {
-                weighted.col_as_slice_mut(c).iter_mut().zip(&weight).for_each(|(x, w)| *x *= w);
-            }
-            let mut normal = lower_of_product(weighted.transpose(), table.as_ref());
-            (0..width).for_each(|c| normal[(c, c)] += 1e-9 * n as f64);
-            let right = product(weighted.transpose(), errors.as_ref());
-            let factor = cholesky(normal.as_ref()).ok()?;
-            let solution = factor.solve(right.as_ref());
-            value = solution.col_as_slice(0).to_vec();
-            inverse = factor.inverse();
-            let said = product(table.as_ref(), solution.as_ref());
-            left = error.iter().zip(said.col_as_slice(0)).map(|(y, said)| y - said).collect();
+            let times_root =
+                |column: &[f64]| column.iter().zip(&weight).map(|(v, w): (_, &f64)| v * w.sqrt()).collect();
+            let weighted: Vec<Vec<f64>> = all.iter().copied().chain([error.as_slice()]).map(times_root).collect();
+            let views: Vec<&[f64]> = weighted.iter().map(Vec::as_slice).collect();
+            let fit = solve(&Gram::of(&views, 0..n), &priors, 1.0)?;
+            left.clone_from(error);
+            all.iter().zip(&fit.coefficients).for_each(|(column, c)| add_scaled(&mut left, column, -c));
+            solution = Some(fit);
             sigma = median_and_std(&mut left.clone()).1;
             if sigma <= 0.0 {
                 break;
@@ -228,6 +214,7 @@ impl<'a> StateModel<'a> {
                 *weight = (HUBER * sigma / left.abs()).min(1.0);
             }
         }
+        let solution = solution?;
         // Correlation from row to row, of residuals that are cut where outliers begin.
         let cut = |x: f64| x.clamp(-3.0 * sigma, 3.0 * sigma);
         let (mut own, mut next) = (0.0, 0.0);
@@ -240,8 +227,8 @@ impl<'a> StateModel<'a> {
         let correlation = if own > 0.0 { (next / own).clamp(0.0, 0.98) } else { 0.0 };
         let inflation = (1.0 + correlation) / (1.0 - correlation);
         let misfit = left.iter().zip(&weight).map(|(left, weight)| weight * left * left).sum();
-        let std = (0..width).map(|a| sigma * (inflation * inverse[(a, a)]).sqrt() / size[a]).collect();
-        value.iter_mut().zip(&size).for_each(|(value, size)| *value /= size);
-        Some(StateFit { value, std, unit_std: sigma * (inflation / n as f64).sqrt(), misfit })
+        let variances = solution.covariance().into_iter().step_by(all.len() + 1);
+        let std = variances.map(|variance| sigma * (inflation * variance).sqrt()).collect();
+        Some(StateFit { value: solution.coefficients, std, unit_std: sigma * (inflation / n as f64).sqrt(), misfit })
     }
 }
