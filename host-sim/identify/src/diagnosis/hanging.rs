@@ -29,9 +29,10 @@ pub(crate) fn hanging(on: &Excitation<'_>, explained: &[f64], white: f64) -> Vec
     if least < BEYOND_NOISE * white {
         return hanging;
     }
+    let left = on.left(explained);
     for session in &rows.sessions {
         for Event { rows: event, side } in may_hang(rows, session, &on.base.flank, on.nominal.friction_torque_n_m) {
-            let short = |k: &usize| (rows.error[*k] - on.base.prediction[*k] - explained[*k]) * side > least;
+            let short = |k: &usize| left[*k] * side > least;
             let Some(last) = event.clone().rev().find(short) else { continue };
             let over = event.start..last + 1;
             // Most of them: a row far behind that was read wrong is no output that hangs so long.

@@ -333,8 +333,7 @@ pub fn noise(
     near: Option<Noise>,
 ) -> (Noise, f64) {
     let rows = on.rows;
-    let left: Vec<f64> =
-        (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
+    let left = on.left(explained);
     let white = white_level(rows, &left);
     let stride = columns.stride;
     let plain = Whitener::plain(rows, uncertain, stride, white);

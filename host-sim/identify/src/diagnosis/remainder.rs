@@ -47,8 +47,7 @@ pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f
 #[must_use]
 pub(crate) fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
     let on = problem.on;
-    let explained = explained(problem, selected);
-    let left: Vec<f64> = (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
+    let left = on.left(&explained(problem, selected));
     let whitener = Whitener::new(on.rows, &problem.uncertain, 1, noise);
     let mut white = whitener.in_rows(&whitener.whiten(&left), on.rows.len());
     for (value, uncertain) in white.iter_mut().zip(&problem.uncertain) {

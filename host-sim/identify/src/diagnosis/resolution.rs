@@ -38,8 +38,7 @@ pub(crate) fn resolution(
     averages: usize,
     explained: &[f64],
 ) -> Resolution {
-    let known = |k: usize| on.base.prediction[k] + explained.get(k).unwrap_or(&0.0);
-    let left: Vec<f64> = on.rows.error.iter().enumerate().map(|(k, e)| e - known(k)).collect();
+    let left = on.left(explained);
     let stride = (on.rows.count_used() / averages).max(1);
     if stride == 1 {
         return Resolution { stride, fast: Vec::new() };

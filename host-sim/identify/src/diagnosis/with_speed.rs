@@ -11,6 +11,7 @@ use super::rows::{quantile, robust_std};
 use super::select::Selected;
 use super::uncertainty::Known;
 use crate::causes::{CauseName, ParameterName};
+use crate::least_squares::Normal;
 
 /// Slow rows are this share of those in motion, … *Guess*: the slowest third.
 const SLOW: f64 = 0.35;
@@ -97,8 +98,7 @@ pub(super) fn with_speed(
         let from = others.fit.starts[k];
         others.fit.solution.coefficients[from..from + selected.terms[k].len()].fill(0.0);
     }
-    let explained = explained(problem, &others);
-    let left = |k: usize| rows.error[k] - problem.on.base.prediction[k] - explained[k];
+    let left = problem.on.left(&explained(problem, &others));
     let used: Vec<usize> = rows.sessions_used().flatten().filter(|k| !problem.uncertain[*k]).collect();
     let speed = |k: usize| rows.speed[k].abs();
     let least = IN_MOTION * quantile(used.iter().map(|k| speed(*k)), 0.95);
@@ -112,7 +112,7 @@ pub(super) fn with_speed(
     if groups.iter().any(|group| group.len() < FEWEST) || speeds[1] < APART * speeds[0] {
         return None;
     }
-    let [at_slow, at_fast] = groups.map(|group| amplitude(&group, |k| order * rows.generator[k], left));
+    let [at_slow, at_fast] = groups.map(|group| amplitude(&group, |k| order * rows.generator[k], |k| left[k]));
     let ((slow, slow_std), (fast, fast_std)) = (at_slow?, at_fast?);
     Some(WithSpeed { speeds, amplitudes: [slow, fast], stds: [slow_std, fast_std] })
 }
@@ -122,25 +122,26 @@ pub(super) fn with_speed(
 /// wander and other lines are alike from row to row.
 fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
     let count = rows.len() as f64;
-    let waves: Vec<[f64; 3]> = rows.iter().map(|k| [angle(*k).cos(), angle(*k).sin(), value(*k)]).collect();
-    let mean = |of: usize| waves.iter().map(|wave| wave[of]).sum::<f64>() / count;
-    let means = [mean(0), mean(1), mean(2)];
-    let product = |a: usize, b: usize| waves.iter().map(|w| (w[a] - means[a]) * (w[b] - means[b])).sum::<f64>();
-    let (cc, ss, cs) = (product(0, 0), product(1, 1), product(0, 1));
-    let determinant = cc * ss - cs * cs;
+    let wave = |k: &usize| [1.0, angle(*k).cos(), angle(*k).sin(), value(*k)];
+    let waves: Vec<[f64; 4]> = rows.iter().map(wave).collect();
+    let put = |k: usize, row: &mut [f64]| {
+        row.copy_from_slice(&waves[k][..3]);
+        (waves[k][3], 1.0)
+    };
+    let fit = Normal::of(3, waves.len(), put)?.sound(waves.len())?;
+    let [mean, cosine, sine] = fit.values()[..] else { return None };
+    let inverse = &fit.inverse;
     // Rows that see too little of the wave to tell its two parts.
-    if determinant < 1e-2 * count * count * 0.25 {
+    if inverse[(1, 1)] * inverse[(2, 2)] - inverse[(1, 2)].powi(2) > 4e2 / (count * count) {
         return None;
     }
-    let solved = |c: f64, s: f64| [(ss * c - cs * s) / determinant, (cc * s - cs * c) / determinant];
-    let [cosine, sine] = solved(product(0, 2), product(1, 2));
     let amplitude = cosine.hypot(sine);
-    let left = |w: &[f64; 3]| w[2] - means[2] - cosine * (w[0] - means[0]) - sine * (w[1] - means[1]);
+    let left = |wave: &[f64; 4]| wave[3] - mean - cosine * wave[1] - sine * wave[2];
     let white = robust_std(waves.iter().map(left)) * (2.0 / count).sqrt();
     // What a block adds to the amplitude that was found.
-    let added = |block: &[[f64; 3]]| -> f64 {
-        let score = |of: usize| block.iter().map(|w| (w[of] - means[of]) * left(w)).sum::<f64>();
-        let [c, s] = solved(score(0), score(1));
+    let added = |block: &[[f64; 4]]| -> f64 {
+        let scores = [0, 1, 2].map(|of: usize| block.iter().map(|wave| wave[of] * left(wave)).sum::<f64>());
+        let [c, s] = [1, 2].map(|a: usize| (0..3).map(|b: usize| inverse[(a, b)] * scores[b]).sum::<f64>());
         (c * cosine + s * sine) / amplitude.max(1e-30)
     };
     let blocks = waves.chunks(waves.len().div_ceil(BLOCKS));

@@ -93,6 +93,14 @@ impl<'a> Excitation<'a> {
         Excitation { rows, base, ..*self }
     }
 
+    /// The error less what is predicted and what is `explained` already (nothing if it is empty), row by row, arcsec.
+    #[must_use]
+    pub(crate) fn left(&self, explained: &[f64]) -> Vec<f64> {
+        let explained = explained.iter().chain(std::iter::repeat(&0.0));
+        let predicted = self.base.prediction.iter().zip(explained);
+        self.rows.error.iter().zip(predicted).map(|(error, (nominal, more))| error - nominal - more).collect()
+    }
+
     /// Whether the output is not loaded beyond friction, which then says nothing of the flank that carries.
     #[must_use]
     pub(crate) fn unloaded(&self) -> bool {
