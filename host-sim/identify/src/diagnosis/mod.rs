@@ -377,7 +377,7 @@ fn remembered(laws: &[Law], terms: &[Term<'_>]) -> Vec<(usize, Vec<f64>)> {
 }
 
 /// Lines in every row, as averages would hide the fast ones, with their size in arcsec.
-fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<(remainder::Line, f64)> {
+fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<(remainder::SpectralLine, f64)> {
     let every = remainder::every_row(problem, selected, noise);
     let rows = every.len();
     remainder::lines(problem, &every, HIGHEST_ORDER.min(problem.on.rows.highest_order()))

@@ -1,4 +1,4 @@
-//! What is left when the causes are in: lines, steps and slow motion that noise does not make.
+//! Residual with the causes in the model: spectral lines and slow motion that noise does not make.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -14,9 +14,9 @@ use super::select::{self, Selected, less};
 use super::thresholds::remainder::*;
 use crate::measurement::least_and_most;
 
-/// A line found in what is left.
+/// A line in the spectrum of the residual.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Line {
+pub struct SpectralLine {
     /// What it is counted against.
     pub per: Per,
     /// Periods per unit.
@@ -61,26 +61,25 @@ pub(crate) fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: N
 /// Innovations are laid on an even grid of the angle (all sessions, both directions) or of time and transformed; a grid
 /// place that was visited often counts often, as in a periodogram at uneven places.
 #[must_use]
-pub(crate) fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
+pub(crate) fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<SpectralLine> {
     let rows = problem.on.rows;
-    let mut found = Vec::new();
-    found.extend(
-        strongest(&rows.generator, innovations, 0.0, highest_order / (2.0 * PI), None).map(|(f, power)| Line {
-            per: Per::GeneratorTurn,
-            order: f * 2.0 * PI,
-            power,
-        }),
-    );
-    if rows.recorded.time {
-        let time = time_without_gaps(rows);
-        let cell = Some(0.5 * rows.period);
-        found.extend(strongest(&time, innovations, SLOWEST_LINE_HZ, 0.5 / rows.period, cell).map(|(f, power)| Line {
-            per: Per::Second,
-            order: f,
-            power,
-        }));
+    let strongest = |per: Per, lowest: f64, highest: f64, cell: Option<f64>| {
+        let (places, unit) = places(rows, per);
+        let found = strongest(&places, innovations, lowest / unit, highest / unit, cell);
+        found.map(|(frequency, power)| SpectralLine { per, order: frequency * unit, power })
+    };
+    let by_angle = strongest(Per::GeneratorTurn, 0.0, highest_order, None);
+    let in_time = || strongest(Per::Second, SLOWEST_LINE_HZ, 0.5 / rows.period, Some(0.5 * rows.period));
+    by_angle.into_iter().chain(rows.recorded.time.then(in_time).flatten()).collect()
+}
+
+/// Where the rows stand in what a line is counted against, rad or s, and one unit of it.
+fn places(rows: &Rows, per: Per) -> (Cow<'_, [f64]>, f64) {
+    match per {
+        Per::Second => (Cow::Owned(time_without_gaps(rows)), 1.0),
+        Per::GeneratorTurn => (Cow::Borrowed(&rows.generator), 2.0 * PI),
+        Per::OutputTurn => (Cow::Borrowed(&rows.output), 2.0 * PI),
     }
-    found
 }
 
 /// Time of all sessions one after the other: gaps would only make a transform long.
@@ -104,15 +103,11 @@ const PARTS: i32 = 8;
 /// A line as it is in each row: between two places of the spectrum, in cells that it turns through, it is up to half as
 /// strong there.
 #[must_use]
-pub(crate) fn at_its_places(rows: &Rows, innovations: &[f64], line: &Line) -> Line {
-    let (places, per) = match line.per {
-        Per::Second => (Cow::Owned(time_without_gaps(rows)), 1.0),
-        Per::GeneratorTurn => (Cow::Borrowed(&rows.generator), 2.0 * PI),
-        Per::OutputTurn => (Cow::Borrowed(&rows.output), 2.0 * PI),
-    };
+pub(crate) fn at_its_places(rows: &Rows, innovations: &[f64], line: &SpectralLine) -> SpectralLine {
+    let (places, per) = places(rows, line.per);
     let (low, high) = least_and_most(places.iter().copied());
     let total: f64 = innovations.iter().map(|v| v * v).sum();
-    let at = |part: i32| -> Line {
+    let at = |part: i32| -> SpectralLine {
         // The spectrum has two places to a period over all rows.
         let order = line.order + per * f64::from(part) / f64::from(PARTS) / (2.0 * (high - low).max(f64::MIN_POSITIVE));
         let [mut cosine, mut sine] = [0.0; 2];
@@ -121,21 +116,16 @@ pub(crate) fn at_its_places(rows: &Rows, innovations: &[f64], line: &Line) -> Li
             cosine += v * c;
             sine += v * s;
         }
-        Line { order, power: (cosine * cosine + sine * sine) / total.max(1e-30), ..line.clone() }
+        SpectralLine { order, power: (cosine * cosine + sine * sine) / total.max(1e-30), ..line.clone() }
     };
     (-PARTS / 2..=PARTS / 2).map(at).max_by(|a, b| a.power.total_cmp(&b.power)).unwrap_or_else(|| line.clone())
 }
 
 /// Whether averaging the rows takes most of a line away.
 #[must_use]
-pub(crate) fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
-    let rows = problem.on.rows;
-    let angle: Vec<f64> = match line.per {
-        Per::Second => rows.time.iter().map(|t| 2.0 * PI * line.order * t).collect(),
-        Per::GeneratorTurn => rows.generator.iter().map(|psi| line.order * psi).collect(),
-        Per::OutputTurn => rows.output.iter().map(|turned| line.order * turned).collect(),
-    };
-    let wave: Vec<f64> = angle.iter().map(|a| a.cos()).collect();
+pub(crate) fn averaged_away(problem: &Problem<'_>, line: &SpectralLine) -> bool {
+    let (places, per) = places(problem.on.rows, line.per);
+    let wave: Vec<f64> = places.iter().map(|x| (2.0 * PI * line.order / per * x).cos()).collect();
     problem.whitener.hides(&wave)
 }
 
