@@ -87,7 +87,7 @@ pub(super) fn row_of_group(parts: &[PartName], at: &State, scales: &Scales, valu
 
 /// Noise of the rows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Noise {
+pub struct RowNoise {
     /// Residual of the rows that it was fitted to, arcsec rms.
     pub rms_arcsec: f64,
     /// Of that the noise of single rows; 0 where rows are so far apart that what no part has changes from row to row as
@@ -97,10 +97,10 @@ pub struct Noise {
     pub hangs_together: f64,
 }
 
-impl Noise {
+impl RowNoise {
     /// From what is left of the rows of each file, in order, and the generator's usual step between them;
     /// `rows_of_a_step` of them pass while an angle stays within one step of its resolution.
-    pub fn of(left: &[Vec<f64>], coefficients: usize, step_rad: f64, rows_of_a_step: f64) -> Noise {
+    pub fn of(left: &[Vec<f64>], coefficients: usize, step_rad: f64, rows_of_a_step: f64) -> RowNoise {
         let rows: usize = left.iter().map(Vec::len).sum();
         let squares: f64 = left.iter().flatten().map(|e| e * e).sum();
         let variance = squares / rows.saturating_sub(coefficients).max(1) as f64;
@@ -126,7 +126,7 @@ impl Noise {
         let close = step_rad * f64::from(GENERATOR_ORDERS) <= CLOSE_RAD;
         let most_white = (variance - common).max(0.0).sqrt();
         let white = if close { white_noise(left.iter().map(Vec::as_slice)).min(most_white) } else { 0.0 };
-        Noise { rms_arcsec: variance.sqrt(), white_arcsec: white, hangs_together: most }
+        RowNoise { rms_arcsec: variance.sqrt(), white_arcsec: white, hangs_together: most }
     }
 
     /// Variance that stands for a row where many are fitted, arcsec².
@@ -222,7 +222,7 @@ fn usual_step(rows: &[Row], angle: fn(&State) -> f64) -> f64 {
 }
 
 /// What a model leaves of the rows of each log about its mean, arcsec, and the noise in that.
-pub(super) fn left_by(rows: &[Row], model: &Model, logs: usize, coarse_rad: f64) -> (Vec<Vec<f64>>, Noise) {
+pub(super) fn left_by(rows: &[Row], model: &Model, logs: usize, coarse_rad: f64) -> (Vec<Vec<f64>>, RowNoise) {
     let mut left = vec![Vec::new(); logs];
     rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
     for file in &mut left {
@@ -232,7 +232,7 @@ pub(super) fn left_by(rows: &[Row], model: &Model, logs: usize, coarse_rad: f64)
     let step_rad = usual_step(rows, |at| at.output_rad);
     let rows_of_a_step = if step_rad > 0.0 { coarse_rad / step_rad } else { 0.0 };
     let fitted = model.coefficients.len() + logs;
-    let noise = Noise::of(&left, fitted, usual_step(rows, |at| at.generator_rad), rows_of_a_step);
+    let noise = RowNoise::of(&left, fitted, usual_step(rows, |at| at.generator_rad), rows_of_a_step);
     (left, noise)
 }
 
@@ -247,7 +247,7 @@ pub struct Known {
     /// What stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the fit.
     of_no_part_arcsec: f64,
     /// Noise of the rows.
-    pub noise: Noise,
+    pub noise: RowNoise,
 }
 
 impl Known {
@@ -292,7 +292,7 @@ impl Known {
         let off = &after.coefficients;
         let pairs = off.iter().flat_map(|a| off.iter().map(move |b| a * b));
         let covariance = after.covariance().iter().zip(pairs).map(|(of_one, pair)| of_a_row * of_one + pair).collect();
-        let everywhere = Noise { rms_arcsec: noise.rms_arcsec.max(left_out_arcsec), ..noise };
+        let everywhere = RowNoise { rms_arcsec: noise.rms_arcsec.max(left_out_arcsec), ..noise };
         let of_no_part_arcsec = everywhere.beside_white_arcsec();
         Some(Known { model: model.clone(), parts, covariance, of_no_part_arcsec, noise })
     }

@@ -36,7 +36,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
 use interval::OF_95;
-pub use interval::{Known, Node, Noise};
+pub use interval::{Known, Node, RowNoise};
 pub use parts::{PartName, Scales, State};
 pub use plan::{Bench, Pass, Planned, Wide, plan};
 pub use prior::Prior;
@@ -333,7 +333,7 @@ pub struct Calibration {
     /// Every node of every part, with an interval.
     pub nodes: Vec<Node>,
     /// Noise of the rows.
-    pub noise: Noise,
+    pub noise: RowNoise,
     /// Half width of the interval that holds the table's error in a state with 95 %, mean square root over all loads,
     /// angles and temperatures between the least and the largest recorded, evenly, at the paces recorded; arcsec.
     pub half_width_arcsec: f64,
@@ -749,7 +749,7 @@ fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Record
 }
 
 /// The zero of the output in each file.
-fn output_zeros(files: &[Recording], rows: &Rows, model: &Model, noise: Noise) -> Vec<OutputZero> {
+fn output_zeros(files: &[Recording], rows: &Rows, model: &Model, noise: RowNoise) -> Vec<OutputZero> {
     let mut sums = vec![(0.0, 0.0); files.len()];
     for row in &rows.rows {
         sums[row.at.log].0 += row.left_arcsec - model.adds_arcsec(&row.at);

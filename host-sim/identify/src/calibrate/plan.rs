@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::interval::{Node, Noise, OF_95, planned_covariance, row, row_of_group, spread, width_of, widths};
+use super::interval::{Node, OF_95, RowNoise, planned_covariance, row, row_of_group, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, late_s};
 use super::{
@@ -119,10 +119,10 @@ impl Bench {
     }
 
     /// The noise that it is expected to have, of rows as many as are fitted.
-    fn noise(&self) -> Noise {
+    fn noise(&self) -> RowNoise {
         let (white, wander) = (self.noise_arcsec.powi(2), self.wander_arcsec.powi(2));
         let rows_in_a_wander = 2.0 * self.wander_s * self.rate_fitted_hz();
-        Noise {
+        RowNoise {
             rms_arcsec: (white + wander).sqrt(),
             white_arcsec: self.noise_arcsec,
             hangs_together: (white + wander * (1.0 + rows_in_a_wander)) / (white + wander),
@@ -174,7 +174,7 @@ pub struct Planned {
     /// Limits of the bench.
     pub bench: Bench,
     /// The noise that the accuracy holds for.
-    pub noise: Noise,
+    pub noise: RowNoise,
     /// The recordings.
     pub passes: Vec<Pass>,
     /// Time that they take, minutes.

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::rows::{Axis, Direction, Residual};
+use super::rows::{Axis, Direction, ResidualRows};
 use crate::measurement::median_of;
 
 /// Bins of a turn: 3 degrees, a third of the arc over which teeth engage.
@@ -32,18 +32,14 @@ pub struct AngleMap {
     pub bins: Vec<Bin>,
 }
 
-pub(super) fn of(residual: &Residual<'_>) -> Vec<AngleMap> {
+pub(super) fn of(residual: &ResidualRows<'_>) -> Vec<AngleMap> {
     let mut maps = Vec::new();
     for axis in Axis::ALL {
         let angle = residual.angle(axis);
         for direction in [Direction::Forward, Direction::Backward] {
-            let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
-            for (row, angle) in angle.iter().enumerate() {
-                if residual.forward[row] == (direction == Direction::Forward) {
-                    bins[bin_of(*angle, BINS)].push(residual.value[row]);
-                }
-            }
-            let bins: Vec<Bin> = bins
+            let of_way = |k: &usize| residual.forward[*k] == (direction == Direction::Forward);
+            let rows = (0..angle.len()).filter(of_way).map(|k| (angle[k], residual.value[k]));
+            let bins: Vec<Bin> = folded(rows, BINS)
                 .iter_mut()
                 .enumerate()
                 .filter(|(_, values)| !values.is_empty())
@@ -60,7 +56,11 @@ pub(super) fn of(residual: &Residual<'_>) -> Vec<AngleMap> {
     maps
 }
 
-/// Which of the bins of a turn an angle (rad) lies in.
-pub(super) fn bin_of(angle: f64, bins: usize) -> usize {
-    ((angle.rem_euclid(TAU) / TAU * bins as f64) as usize).min(bins - 1)
+/// Values at angles (rad) by the bin of a turn that they lie in.
+pub(super) fn folded(rows: impl Iterator<Item = (f64, f64)>, bins: usize) -> Vec<Vec<f64>> {
+    let mut of_bins = vec![Vec::new(); bins];
+    for (angle, value) in rows {
+        of_bins[((angle.rem_euclid(TAU) / TAU * bins as f64) as usize).min(bins - 1)].push(value);
+    }
+    of_bins
 }

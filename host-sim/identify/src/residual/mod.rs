@@ -16,7 +16,7 @@ mod spectrum;
 mod time;
 
 pub use map::{AngleMap, Bin};
-pub use noise::Noise;
+pub use noise::ResidualNoise;
 pub use orders::{Line, NamedOrder, Wheel, harmonics, named_orders};
 pub(crate) use pulses::Pulse;
 pub use rows::{Axis, Direction, SizeMismatch};
@@ -27,7 +27,7 @@ use serde::Serialize;
 
 use crate::diagnosis::rows::Rows;
 use crate::measurement::rms;
-use rows::Residual;
+use rows::ResidualRows;
 
 /// The picture of a residual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,7 +37,7 @@ pub struct Picture {
     /// Root mean square about zero, arcsec.
     pub rms_arcsec: f64,
     /// Noise under it.
-    pub noise: Noise,
+    pub noise: ResidualNoise,
     /// Medians over the angles, for each direction.
     pub maps: Vec<AngleMap>,
     /// Orders in ψ, ψ−δ and δ.
@@ -54,7 +54,7 @@ impl Picture {
     /// # Errors
     /// There are more values than rows, or fewer.
     pub fn of(rows: &Rows, residual_arcsec: &[f64], ratio: f64) -> Result<Picture, SizeMismatch> {
-        let residual = Residual::new(rows, residual_arcsec)?;
+        let residual = ResidualRows::new(rows, residual_arcsec)?;
         let ((spectra, noise), (pulses, rest)) = rayon::join(
             || {
                 let centred = residual.centred_by_direction();

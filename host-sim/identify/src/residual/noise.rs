@@ -12,7 +12,7 @@ const WINDOW: f64 = 6.0;
 
 /// Noise of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Noise {
+pub struct ResidualNoise {
     /// Standard deviation of the part that changes from row to row, arcsec.
     pub white_arcsec: f64,
     /// Robust standard deviation of the rest, lines and means by direction taken out: wander, and what is not
@@ -25,7 +25,7 @@ pub struct Noise {
 }
 
 /// `lines` are sines of the generator angle that are taken out first.
-pub(super) fn of(rows: &Rows, centred: &[f64], lines: &[Line]) -> Noise {
+pub(super) fn of(rows: &Rows, centred: &[f64], lines: &[Line]) -> ResidualNoise {
     let white = white_noise(rows.sessions.iter().map(|session| &centred[session.clone()]));
     let mut left: Vec<f64> = centred
         .iter()
@@ -37,7 +37,7 @@ pub(super) fn of(rows: &Rows, centred: &[f64], lines: &[Line]) -> Noise {
     left.iter_mut().for_each(|value| *value = value.clamp(-4.0 * spread, 4.0 * spread));
     let length = correlation_length(&left);
     let n = left.len() as f64;
-    Noise {
+    ResidualNoise {
         white_arcsec: white,
         correlated_arcsec: (spread * spread - white * white).max(0.0).sqrt(),
         decorrelation_rows: length,

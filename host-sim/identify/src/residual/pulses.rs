@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde::Serialize;
 
-use super::map::bin_of;
-use super::rows::{Axis, Residual};
+use super::map::folded;
+use super::rows::{Axis, ResidualRows};
 use crate::least_squares::Normal;
 use crate::measurement::{least_and_most, median_and_std};
 
@@ -38,7 +38,7 @@ pub struct Pulse {
     pub height_std_arcsec: f64,
 }
 
-pub(super) fn find(residual: &Residual<'_>) -> Vec<Pulse> {
+pub(super) fn find(residual: &ResidualRows<'_>) -> Vec<Pulse> {
     let mut found: Vec<Pulse> =
         [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(residual, axis)).collect();
     // Both wheels turn almost alike: a pulse of one is a shadow on the other. The sharper one is meant.
@@ -50,7 +50,7 @@ pub(super) fn find(residual: &Residual<'_>) -> Vec<Pulse> {
     found
 }
 
-fn on(residual: &Residual<'_>, axis: Axis) -> Option<Pulse> {
+fn on(residual: &ResidualRows<'_>, axis: Axis) -> Option<Pulse> {
     let angle = residual.angle(axis);
     let (low, high) = least_and_most(angle.iter().copied());
     if high - low < FEWEST_TURNS * TAU {
@@ -59,8 +59,8 @@ fn on(residual: &Residual<'_>, axis: Axis) -> Option<Pulse> {
     let centred = residual.centred_by_direction();
     // First and second half of the rows by themselves: a pulse is in both.
     let half = angle.len() / 2;
-    let whole = folded(&angle, &centred);
-    let (first, second) = (folded(&angle[..half], &centred[..half]), folded(&angle[half..], &centred[half..]));
+    let whole = medians(&angle, &centred);
+    let (first, second) = (medians(&angle[..half], &centred[..half]), medians(&angle[half..], &centred[half..]));
     let best = best(&whole)?;
     let again = |bins: &[(f64, f64)]| fit(bins, best.1, best.2, best.3).map(|(height, _)| height);
     let (height, std) = best.0;
@@ -76,11 +76,8 @@ fn on(residual: &Residual<'_>, axis: Axis) -> Option<Pulse> {
 }
 
 /// Median and number of rows in each bin of a turn.
-fn folded(angle: &[f64], value: &[f64]) -> Vec<(f64, f64)> {
-    let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
-    for (angle, value) in angle.iter().zip(value) {
-        bins[bin_of(*angle, BINS)].push(*value);
-    }
+fn medians(angle: &[f64], value: &[f64]) -> Vec<(f64, f64)> {
+    let mut bins = folded(angle.iter().copied().zip(value.iter().copied()), BINS);
     bins.iter_mut().map(|values| (median_and_std(values).0, values.len() as f64)).collect()
 }
 

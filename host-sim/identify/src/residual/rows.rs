@@ -55,7 +55,7 @@ pub struct SizeMismatch {
 }
 
 /// A residual over the rows.
-pub(super) struct Residual<'a> {
+pub(super) struct ResidualRows<'a> {
     pub rows: &'a Rows,
     /// One value for each row, arcsec.
     pub value: &'a [f64],
@@ -65,7 +65,7 @@ pub(super) struct Residual<'a> {
     pub forward: Vec<bool>,
 }
 
-impl<'a> Residual<'a> {
+impl<'a> ResidualRows<'a> {
     pub fn new(rows: &'a Rows, value: &'a [f64]) -> Result<Self, SizeMismatch> {
         if value.len() != rows.len() {
             return Err(SizeMismatch { found: value.len(), needed: rows.len() });
@@ -73,7 +73,7 @@ impl<'a> Residual<'a> {
         let output = rows.output.iter().zip(&rows.error).map(|(nominal, error)| nominal + error / ARCSEC_PER_RAD);
         let directions = rows.sessions.iter().flat_map(|session| directions(&rows.generator[session.clone()]));
         let forward = directions.map(|way| way > 0.0).collect();
-        Ok(Residual { rows, value, output: output.collect(), forward })
+        Ok(ResidualRows { rows, value, output: output.collect(), forward })
     }
 
     /// The angle of an axis, rad.

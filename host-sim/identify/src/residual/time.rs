@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::rows::Residual;
+use super::rows::ResidualRows;
 use crate::diagnosis::rows::parts;
 use crate::measurement::median_and_std;
 
@@ -33,7 +33,7 @@ pub struct SessionDrift {
     pub stretches: Vec<Stretch>,
 }
 
-pub(super) fn of(residual: &Residual<'_>) -> Vec<SessionDrift> {
+pub(super) fn of(residual: &ResidualRows<'_>) -> Vec<SessionDrift> {
     let of_session = |(number, session): (usize, &Range<usize>)| {
         let size = session.len().div_ceil(STRETCHES).max(FEWEST);
         let whole = parts(session, size).filter(|part| 2 * part.len() >= size);
