@@ -9,7 +9,7 @@ mod fourier;
 mod sparse;
 
 pub use dense::{CholeskyFactor, Mat, MatRef, cholesky, lower_of_product, product};
-pub use fourier::{Complex, spectrum, values_of};
+pub use fourier::{Complex, spectrum};
 pub use sparse::SparseCholesky;
 
 use thiserror::Error;

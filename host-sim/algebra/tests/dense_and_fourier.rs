@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use flexspline_algebra::{Complex, Mat, NotPositiveDefinite, cholesky, lower_of_product, product, spectrum, values_of};
+use flexspline_algebra::{Complex, Mat, NotPositiveDefinite, cholesky, lower_of_product, product, spectrum};
 
 /// Entries that look random, and twice as many rows as columns.
 fn tall(columns: usize) -> Mat {
@@ -46,10 +46,10 @@ fn the_lower_triangle_is_that_of_the_product() {
 }
 
 #[test]
-fn a_wave_stands_where_it_belongs_and_comes_back() {
+fn a_wave_stands_where_it_belongs() {
     for length in [48_usize, 75] {
         let wave: Vec<f64> = (0..length).map(|n| 0.5 + 3.0 * (TAU * 7.0 * n as f64 / length as f64).sin()).collect();
-        let mut sums = spectrum(&mut wave.clone());
+        let sums = spectrum(&mut wave.clone());
         for (k, sum) in sums.iter().enumerate() {
             let due = match k {
                 0 => Complex::new(0.5, 0.0),
@@ -58,7 +58,5 @@ fn a_wave_stands_where_it_belongs_and_comes_back() {
             };
             assert!((sum / length as f64 - due).norm() < 1e-13, "{length}, {k}: {sum}");
         }
-        let back = values_of(&mut sums, length);
-        assert!(wave.iter().zip(&back).all(|(a, b)| (a - b / length as f64).abs() < 1e-13));
     }
 }

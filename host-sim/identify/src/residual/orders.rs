@@ -2,26 +2,15 @@
 
 use serde::Serialize;
 
+use super::rows::Axis;
 use crate::least_squares::Normal;
-
-/// The axis of an order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Wheel {
-    /// Flexspline or generator: whole numbers in a generator turn.
-    FlexsplineOrGenerator,
-    /// Circular spline: whole numbers in a turn of ψ−δ.
-    CircularSpline,
-    /// Output and its encoder: whole numbers in an output turn.
-    Output,
-}
 
 /// An order that a part of the drive makes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NamedOrder {
-    /// Which part.
-    pub wheel: Wheel,
-    /// Waves in a turn of that part's angle.
+    /// The angle whose turn it is counted in.
+    pub axis: Axis,
+    /// Waves in a turn of that angle.
     pub harmonic: u32,
     /// Waves in a generator turn.
     pub per_generator_turn: f64,
@@ -32,15 +21,11 @@ const NAMED: u32 = 8;
 
 /// Orders that parts of a drive with this ratio make: harmonics 1 to 8 of each.
 pub fn named_orders(ratio: f64) -> Vec<NamedOrder> {
-    let wheels = [
-        (Wheel::FlexsplineOrGenerator, 1.0),
-        (Wheel::CircularSpline, 1.0 - 1.0 / ratio),
-        (Wheel::Output, 1.0 / ratio.abs()),
-    ];
-    let of = |(wheel, turns): (Wheel, f64)| {
-        (1..=NAMED).map(move |harmonic| NamedOrder { wheel, harmonic, per_generator_turn: f64::from(harmonic) * turns })
+    let of = |axis: Axis| {
+        let turns = axis.turns_per_generator_turn(ratio).abs();
+        (1..=NAMED).map(move |harmonic| NamedOrder { axis, harmonic, per_generator_turn: f64::from(harmonic) * turns })
     };
-    wheels.into_iter().flat_map(of).collect()
+    Axis::ALL.into_iter().flat_map(of).collect()
 }
 
 /// A sine `amplitude * sin(order * angle + phase)`.

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde::Serialize;
 
-use super::map::folded;
-use super::rows::{Axis, ResidualRows};
+use super::rows::Axis;
+use crate::diagnosis::rows::Rows;
 use crate::least_squares::Normal;
 use crate::measurement::{least_and_most, median_and_std};
 
@@ -38,9 +38,10 @@ pub struct Pulse {
     pub height_std_arcsec: f64,
 }
 
-pub(super) fn find(residual: &ResidualRows<'_>) -> Vec<Pulse> {
+/// Pulses of a residual less its median in each direction, `centred`.
+pub(super) fn find(rows: &Rows, centred: &[f64]) -> Vec<Pulse> {
     let mut found: Vec<Pulse> =
-        [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(residual, axis)).collect();
+        [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(rows, centred, axis)).collect();
     // Both wheels turn almost alike: a pulse of one is a shadow on the other. The sharper one is meant.
     let score = |pulse: &Pulse| (pulse.height_arcsec / pulse.height_std_arcsec).abs();
     if found.len() == 2 {
@@ -50,16 +51,15 @@ pub(super) fn find(residual: &ResidualRows<'_>) -> Vec<Pulse> {
     found
 }
 
-fn on(residual: &ResidualRows<'_>, axis: Axis) -> Option<Pulse> {
-    let angle = residual.angle(axis);
+fn on(rows: &Rows, centred: &[f64], axis: Axis) -> Option<Pulse> {
+    let angle = axis.angles(rows);
     let (low, high) = least_and_most(angle.iter().copied());
     if high - low < FEWEST_TURNS * TAU {
         return None;
     }
-    let centred = residual.centred_by_direction();
     // First and second half of the rows by themselves: a pulse is in both.
     let half = angle.len() / 2;
-    let whole = medians(&angle, &centred);
+    let whole = medians(&angle, centred);
     let (first, second) = (medians(&angle[..half], &centred[..half]), medians(&angle[half..], &centred[half..]));
     let best = best(&whole)?;
     let again = |bins: &[(f64, f64)]| fit(bins, best.1, best.2, best.3).map(|(height, _)| height);
@@ -77,7 +77,10 @@ fn on(residual: &ResidualRows<'_>, axis: Axis) -> Option<Pulse> {
 
 /// Median and number of rows in each bin of a turn.
 fn medians(angle: &[f64], value: &[f64]) -> Vec<(f64, f64)> {
-    let mut bins = folded(angle.iter().copied().zip(value.iter().copied()), BINS);
+    let mut bins = vec![Vec::new(); BINS];
+    for (angle, value) in angle.iter().zip(value) {
+        bins[((angle.rem_euclid(TAU) / TAU * BINS as f64) as usize).min(BINS - 1)].push(*value);
+    }
     bins.iter_mut().map(|values| (median_and_std(values).0, values.len() as f64)).collect()
 }
 

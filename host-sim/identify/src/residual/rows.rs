@@ -1,4 +1,4 @@
-//! A residual with the angles that it may be tied to.
+//! Angles that a residual may be tied to, and its rows by direction.
 
 use serde::Serialize;
 use thiserror::Error;
@@ -32,16 +32,16 @@ impl Axis {
             Axis::Output => 1.0 / ratio,
         }
     }
-}
 
-/// Sense in which the generator moves, or moved last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Direction {
-    /// Growing generator angle.
-    Forward,
-    /// Falling generator angle.
-    Backward,
+    /// The angle in each row, rad, from the measured output.
+    pub fn angles(self, rows: &Rows) -> Vec<f64> {
+        let output = rows.output.iter().zip(&rows.error).map(|(nominal, error)| nominal + error / ARCSEC_PER_RAD);
+        match self {
+            Axis::Generator => rows.generator.clone(),
+            Axis::Output => output.collect(),
+            Axis::GeneratorLessOutput => rows.generator.iter().zip(output).map(|(psi, delta)| psi - delta).collect(),
+        }
+    }
 }
 
 /// A residual that does not have one value for each row.
@@ -54,45 +54,13 @@ pub struct SizeMismatch {
     pub needed: usize,
 }
 
-/// A residual over the rows.
-pub(super) struct ResidualRows<'a> {
-    pub rows: &'a Rows,
-    /// One value for each row, arcsec.
-    pub value: &'a [f64],
-    /// Measured output angle, rad.
-    pub output: Vec<f64>,
-    /// Whether the generator moves forward, or moved so last.
-    pub forward: Vec<bool>,
-}
-
-impl<'a> ResidualRows<'a> {
-    pub fn new(rows: &'a Rows, value: &'a [f64]) -> Result<Self, SizeMismatch> {
-        if value.len() != rows.len() {
-            return Err(SizeMismatch { found: value.len(), needed: rows.len() });
-        }
-        let output = rows.output.iter().zip(&rows.error).map(|(nominal, error)| nominal + error / ARCSEC_PER_RAD);
-        let directions = rows.sessions.iter().flat_map(|session| directions(&rows.generator[session.clone()]));
-        let forward = directions.map(|way| way > 0.0).collect();
-        Ok(ResidualRows { rows, value, output: output.collect(), forward })
-    }
-
-    /// The angle of an axis, rad.
-    pub fn angle(&self, axis: Axis) -> Vec<f64> {
-        let generator = &self.rows.generator;
-        match axis {
-            Axis::Generator => generator.clone(),
-            Axis::Output => self.output.clone(),
-            Axis::GeneratorLessOutput => generator.iter().zip(&self.output).map(|(psi, delta)| psi - delta).collect(),
-        }
-    }
-
-    /// The residual less its median in each direction.
-    pub fn centred_by_direction(&self) -> Vec<f64> {
-        let values = || self.value.iter().copied().zip(&self.forward);
-        let [backward, forward] = [false, true].map(|way| {
-            let of_way: Vec<f64> = values().filter(|(_, forward)| **forward == way).map(|(value, _)| value).collect();
-            median_of(&mut sampled(&of_way))
-        });
-        values().map(|(value, is_forward)| value - if *is_forward { forward } else { backward }).collect()
-    }
+/// A residual over the rows less its median in each direction of the generator.
+pub(super) fn centred_by_direction(rows: &Rows, residual: &[f64]) -> Vec<f64> {
+    let ways = rows.sessions.iter().flat_map(|session| directions(&rows.generator[session.clone()]));
+    let values: Vec<(f64, bool)> = residual.iter().copied().zip(ways.map(|way| way > 0.0)).collect();
+    let [backward, forward] = [false, true].map(|way| {
+        let of_way: Vec<f64> = values.iter().filter(|of| of.1 == way).map(|of| of.0).collect();
+        median_of(&mut sampled(&of_way))
+    });
+    values.into_iter().map(|(value, is_forward)| value - if is_forward { forward } else { backward }).collect()
 }

@@ -44,7 +44,7 @@ const FALSE_ALARM: f64 = 1e-3;
 /// Lines that are reported at most.
 const MOST_PEAKS: usize = 12;
 /// Points of the curve that are reported at most: of each stretch the highest.
-const MOST_POINTS: usize = 2000;
+const MOST_POINTS: usize = 700;
 
 /// A line of the spectrum.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -82,19 +82,6 @@ pub struct OrderSpectrum {
     pub level_arcsec: Vec<f64>,
     /// Lines above that level, the strongest first.
     pub peaks: Vec<Peak>,
-}
-
-impl OrderSpectrum {
-    /// Its lines as sines of the axis' angle.
-    pub(crate) fn lines(&self) -> Vec<Line> {
-        let line = |peak: &Peak| Line {
-            order: peak.order,
-            amplitude: peak.amplitude_arcsec,
-            phase_rad: peak.phase_rad,
-            amplitude_std: peak.amplitude_std_arcsec,
-        };
-        self.peaks.iter().map(line).collect()
-    }
 }
 
 /// The spectrum of `value` (arcsec) along `angle` (rad), an `axis` of a drive with this ratio. Orders below one wave in

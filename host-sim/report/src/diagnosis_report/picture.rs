@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::thin::{dots, medians, peaks_kept, some_rows};
+use super::thin::{dots, medians, some_rows};
 use super::{DiagnosisKnown, Shown, orders, words};
 use crate::page::{
     ChartAxis, ChartSeries, Detail, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection,
@@ -10,14 +10,15 @@ use crate::page::{
 };
 use flexspline_base::robust::{least_and_most, median_of};
 use flexspline_identify::nominal::Fixed;
-use flexspline_identify::residual::{Axis as Angle, Direction, Wheel};
+use flexspline_identify::residual::Axis as Angle;
 
-/// Points of a spectrum.
-const SPECTRUM_POINTS: usize = 700;
 /// Cells of the map, across and up.
 const MAP: [usize; 2] = [72, 36];
-/// Medians over a quantity.
+/// Medians over a quantity, and rows that each needs.
 const MEDIANS: usize = 24;
+const FEWEST_IN_MEDIAN: usize = 12;
+/// Bins of a turn: 3 degrees, a third of the arc over which teeth engage.
+const BINS_OF_TURN: usize = 120;
 /// A quantity that changes by less than this share of itself is no axis.
 const CHANGES: f64 = 0.03;
 /// Rows that a cell needs before its median is shown.
@@ -44,8 +45,8 @@ impl DiagnosisKnown<'_> {
     }
 
     /// Rows that move in a direction.
-    fn rows_in(&self, direction: f64) -> Vec<usize> {
-        (0..self.rows.len()).filter(|k| self.rows.direction[*k] == direction).collect()
+    fn rows_in(&self, direction: f64) -> impl Iterator<Item = usize> + Clone {
+        (0..self.rows.len()).filter(move |k| self.rows.direction[*k] == direction)
     }
 
     /// Dots and medians over a quantity, by direction.
@@ -60,7 +61,7 @@ impl DiagnosisKnown<'_> {
             }
         }
         for (colour, (direction, name)) in DIRECTIONS.into_iter().enumerate() {
-            let points = medians(quantity, values, &self.rows_in(direction), MEDIANS);
+            let points = medians(quantity, values, self.rows_in(direction), MEDIANS, FEWEST_IN_MEDIAN);
             if points.len() > 1 {
                 lines.series.push(ChartSeries::new(format!("{name}, median"), Mark::Line, 2 + colour, points));
             }
@@ -170,6 +171,8 @@ impl DiagnosisKnown<'_> {
         let mut blocks = Vec::new();
         for (angle, id) in ANGLES {
             let (symbol, wheel) = self.angle_name(angle);
+            let turned: Vec<f64> =
+                angle.angles(&self.rows).into_iter().map(|angle| angle.rem_euclid(TAU).to_degrees()).collect();
             blocks.extend(self.lines(
                 &format!("angle-{id}"),
                 &format!("Over one turn of {symbol}: {wheel}"),
@@ -177,13 +180,13 @@ impl DiagnosisKnown<'_> {
                  these are flat.",
                 ChartAxis::new(format!("{symbol} in its turn"), PageQuantity::Degree),
                 |shown| {
-                    let mut lines = Lines::default();
-                    for map in shown.picture.as_ref()?.maps.iter().filter(|map| map.axis == angle) {
-                        let colour = usize::from(map.direction != Direction::Forward);
-                        let points = map.bins.iter().map(|bin| [bin.angle_rad.to_degrees(), bin.median_arcsec]);
-                        lines.series.push(ChartSeries::new(DIRECTIONS[colour].1, Mark::Line, colour, points.collect()));
-                    }
-                    (!lines.series.is_empty()).then_some(lines)
+                    let values = &shown.level.residual_arcsec;
+                    let series = DIRECTIONS.into_iter().enumerate().map(|(colour, (direction, name))| {
+                        let points = medians(&turned, values, self.rows_in(direction), BINS_OF_TURN, 1);
+                        ChartSeries::new(name, Mark::Line, colour, points)
+                    });
+                    let series: Vec<_> = series.filter(|series| !series.points.is_empty()).collect();
+                    (!series.is_empty()).then(|| Lines::of(series))
                 },
             ));
         }
@@ -211,8 +214,8 @@ impl DiagnosisKnown<'_> {
                         return None;
                     }
                     let x = &spectrum.orders;
-                    let amplitude = peaks_kept(x, &spectrum.amplitude_arcsec, SPECTRUM_POINTS);
-                    let level = peaks_kept(x, &spectrum.level_arcsec, SPECTRUM_POINTS);
+                    let curve = |y: &[f64]| x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
+                    let (amplitude, level) = (curve(&spectrum.amplitude_arcsec), curve(&spectrum.level_arcsec));
                     let peaks = spectrum.peaks.iter().map(|peak| [peak.order, peak.amplitude_arcsec]).collect();
                     let mut lines = Lines::of(vec![
                         ChartSeries::new("amplitude", Mark::Line, 0, amplitude),
@@ -254,10 +257,9 @@ impl DiagnosisKnown<'_> {
                     .named
                     .iter()
                     .map(|named| {
-                        let wheel = match named.wheel {
-                            Wheel::FlexsplineOrGenerator => self.angle_name(Angle::Generator).1,
-                            Wheel::CircularSpline => self.angle_name(Angle::GeneratorLessOutput).1,
-                            Wheel::Output => "output",
+                        let wheel = match named.axis {
+                            Angle::Output => "output",
+                            axis => self.angle_name(axis).1,
                         };
                         format!("{} of {wheel}", named.harmonic)
                     })
@@ -299,41 +301,27 @@ impl DiagnosisKnown<'_> {
     fn drift(&self) -> PageSection {
         let rows = &self.rows;
         let mut blocks = Vec::new();
-        let caption = "Medians of up to 24 stretches of each session, a standard deviation on either side; breaks \
-                       between sessions are taken out.";
+        let caption = "Medians of up to 24 stretches of each session; breaks between sessions are taken out.";
         blocks.extend(self.lines("drift", "Over time", caption, self.time_axis(), |shown| {
-            let drift = &shown.picture.as_ref()?.drift;
-            let mut parts: [Vec<[f64; 2]>; 3] = Default::default();
-            for session in drift {
-                let first = rows.sessions.get(session.session).and_then(|of_it| rows.time.get(of_it.start));
-                let (Some(begin), Some(start)) = (self.clock.begins.get(session.session), first) else { continue };
-                for (k, shift) in [0.0, 1.0, -1.0].into_iter().enumerate() {
-                    if let Some([x, _]) = parts[k].last().copied() {
-                        parts[k].push([0.5 * (x + begin), f64::NAN]);
-                    }
-                    let points = session.stretches.iter();
-                    parts[k].extend(points.map(|s| [begin + s.at - start, s.median_arcsec + shift * s.spread_arcsec]));
+            let mut points: Vec<[f64; 2]> = Vec::new();
+            for (session, begin) in rows.sessions.iter().zip(&self.clock.begins) {
+                if let Some([x, _]) = points.last() {
+                    points.push([0.5 * (x + begin), f64::NAN]);
                 }
+                let values = &shown.level.residual_arcsec;
+                points.extend(medians(&self.clock.at, values, session.clone(), MEDIANS, FEWEST_IN_MEDIAN));
             }
-            let [median, above, below] = parts;
-            let series = |name, colour, points| ChartSeries::new(name, Mark::Broken, colour, points);
-            Some(Lines {
-                series: vec![series("median", 0, median), series("above", 5, above), series("below", 5, below)],
-                uprights: self.clock.borders(),
-                ..Lines::default()
-            })
+            let series = vec![ChartSeries::new("median", Mark::Broken, 0, points)];
+            Some(Lines { series, uprights: self.clock.borders(), ..Lines::default() })
         }));
-        blocks.extend(self.shown.iter().filter_map(|shown| {
-            let noise = shown.picture.as_ref()?.noise;
-            let words = format!(
-                "White noise of a row {{}}; correlated noise, lines taken out, {{}}, over {} rows: the data are worth \
-                 {} independent rows.",
-                significant(noise.decorrelation_rows, 2),
-                significant(noise.independent_rows, 2)
-            );
-            let text = RichText::filled(&words, &[(noise.white_arcsec, 2), (noise.correlated_arcsec, 2)]);
-            Some(PageBlock::paragraph(text).of_choice(shown.level.id))
-        }));
+        let diagnosis = self.sources.diagnosis;
+        let unit = if rows.recorded.time { "s" } else { "rows" };
+        let words = format!(
+            "Noise of the diagnosis: white {{}} in a row, red {{}} with a correlation time of {} {unit}.",
+            significant(diagnosis.wander_correlation_s, 2)
+        );
+        let [white, red] = diagnosis.noise_arcsec;
+        blocks.push(PageBlock::paragraph(RichText::filled(&words, &[(white, 2), (red, 2)])));
         PageSection::new("drift-section", "Drift and noise", Detail::Engineering, blocks)
     }
 }
@@ -346,7 +334,6 @@ fn varies(values: &[f64]) -> bool {
     high - low > CHANGES * high.abs().max(low.abs())
 }
 
-/// Pulses that stay in one position.
 /// A value in arcsec with its standard deviation.
 fn plus_minus(value: f64, std: f64) -> RichText {
     RichText::arcsec(value, 3).plain("\u{a0}±\u{a0}").error(std, 2)

@@ -9,8 +9,6 @@ use flexspline_identify::diagnosis::rows::Rows;
 const STRETCHES: usize = 500;
 /// Rows that are shown as dots.
 const DOTS: usize = 1600;
-/// Rows that a bin must have.
-const FEWEST_IN_BIN: usize = 12;
 /// Breaks between sessions, as a share of all the time that was recorded.
 const BREAK: f64 = 0.012;
 
@@ -103,32 +101,26 @@ pub(super) fn dots(over: &[f64], values: &[f64], rows: &[usize], name: &str, col
     ChartSeries::sorted(name, Mark::Dots, colour, rows.iter().map(|k| [over[*k], values[*k]]).collect())
 }
 
-/// Medians of `count` bins of equal width over a quantity, ascending, where a bin has rows enough.
-pub(super) fn medians(over: &[f64], values: &[f64], rows: &[usize], count: usize) -> Vec<[f64; 2]> {
-    let (low, high) = least_and_most(rows.iter().map(|k| over[*k]).filter(|x| x.is_finite()));
+/// Medians of `count` bins of equal width over a quantity, ascending, where a bin has `fewest` rows.
+pub(super) fn medians(
+    over: &[f64],
+    values: &[f64],
+    rows: impl Iterator<Item = usize> + Clone,
+    count: usize,
+    fewest: usize,
+) -> Vec<[f64; 2]> {
+    let (low, high) = least_and_most(rows.clone().map(|k| over[k]).filter(|x| x.is_finite()));
     let mut bins: Vec<(Vec<f64>, f64)> = vec![(Vec::new(), 0.0); count];
     if high > low {
         for k in rows {
-            let place = ((over[*k] - low) / (high - low) * count as f64) as usize;
+            let place = ((over[k] - low) / (high - low) * count as f64) as usize;
             let bin = &mut bins[place.min(count - 1)];
-            bin.0.push(values[*k]);
-            bin.1 += over[*k];
+            bin.0.push(values[k]);
+            bin.1 += over[k];
         }
     }
-    let enough = bins.iter_mut().filter(|(values, _)| values.len() >= FEWEST_IN_BIN);
+    let enough = bins.iter_mut().filter(|(values, _)| values.len() >= fewest);
     enough.map(|(values, sum)| [*sum / values.len() as f64, median_of(values)]).collect()
-}
-
-/// A curve of at most `most` points: the largest of each group.
-pub(super) fn peaks_kept(x: &[f64], y: &[f64], most: usize) -> Vec<[f64; 2]> {
-    let size = x.len().div_ceil(most).max(1);
-    (0..x.len())
-        .step_by(size)
-        .filter_map(|from| {
-            let best = (from..(from + size).min(x.len())).max_by(|a, b| y[*a].total_cmp(&y[*b]))?;
-            Some([x[best], y[best]])
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -180,18 +172,9 @@ mod tests {
         assert_eq!(some_rows(3), [0, 1, 2]);
         let over: Vec<f64> = all.iter().map(|k| (*k % 100) as f64).collect();
         let values: Vec<f64> = over.iter().map(|x| 3.0 * x).collect();
-        let points = medians(&over, &values, &all, 24);
+        let points = medians(&over, &values, 0..40_000, 24, 12);
         assert_eq!(points.len(), 24);
         assert!(points.iter().all(|[x, y]| (y - 3.0 * x).abs() < 3.0), "{points:?}");
-        assert_eq!(medians(&[1.0; 50], &[1.0; 50], &(0..50).collect::<Vec<_>>(), 9), [] as [[f64; 2]; 0]);
-    }
-
-    #[test]
-    fn thinned_curves_keep_their_peaks() {
-        let x: Vec<f64> = (0..5000).map(f64::from).collect();
-        let mut y = vec![1.0; 5000];
-        y[3777] = 8.0;
-        let points = peaks_kept(&x, &y, 600);
-        assert!(points.len() <= 600 && points.contains(&[3777.0, 8.0]));
+        assert_eq!(medians(&[1.0; 50], &[1.0; 50], 0..50, 9, 12), [] as [[f64; 2]; 0]);
     }
 }
