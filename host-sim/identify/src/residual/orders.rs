@@ -39,52 +39,43 @@ pub struct Line {
     pub phase_rad: f64,
     /// Standard deviation of the amplitude if the noise is white.
     pub amplitude_std: f64,
+    /// The same over that of a sine that stands alone in evenly spread rows: how much the orders and the places of the
+    /// rows confuse each other.
+    pub confusion: f64,
 }
 
 /// A constant and sines of these orders that fit `y` over `angle` (rad) best, all together.
 /// `None` if the data cannot tell the orders apart, or are too few.
 pub fn harmonics(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<(f64, Vec<Line>)> {
-    let n = angle.len().min(y.len());
-    let fit = of_sines(&angle[..n], y, orders)?;
-    let value = fit.values();
-    // Variance of the noise in a row.
-    let variance = fit.misfit() / (n - value.len()) as f64;
-    let unit = amplitude_stds(&fit);
-    let lines = orders
-        .iter()
-        .enumerate()
-        .map(|(place, order)| {
-            let (s, c) = (value[1 + 2 * place], value[2 + 2 * place]);
-            let amplitude_std = unit[place] * variance.sqrt();
-            Line { order: *order, amplitude: s.hypot(c), phase_rad: c.atan2(s), amplitude_std }
-        })
-        .collect();
-    Some((value[0], lines))
-}
-
-/// Standard deviation of each amplitude for white noise of one, over that of a sine that stands alone in evenly spread
-/// rows: how much the orders and the places of the rows confuse each other. `None` as for [`harmonics`].
-pub(super) fn confusion(angle: &[f64], orders: &[f64]) -> Option<Vec<f64>> {
-    let fit = of_sines(angle, &[], orders)?;
-    Some(amplitude_stds(&fit).into_iter().map(|std| std * (angle.len() as f64 / 2.0).sqrt()).collect())
-}
-
-/// A constant and sines; no values stand for zeros.
-fn of_sines(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<Normal> {
-    let (width, rows) = (1 + 2 * orders.len(), angle.len());
+    let (n, width) = (angle.len().min(y.len()), 1 + 2 * orders.len());
     let put = |k: usize, row: &mut [f64]| {
         for (place, order) in orders.iter().enumerate() {
             (row[1 + 2 * place], row[2 + 2 * place]) = (order * angle[k]).sin_cos();
         }
-        (y.get(k).copied().unwrap_or(0.0), 1.0)
+        (y[k], 1.0)
     };
-    (rows > width).then(|| Normal::of(width, rows, put)).flatten()?.sound(rows)
+    let fit = (n > width).then(|| Normal::of(width, n, put)).flatten()?.sound(n)?;
+    let value = fit.values();
+    // Standard deviation of the noise in a row.
+    let noise = (fit.misfit() / (n - width) as f64).sqrt();
+    let line = |(place, order): (usize, &f64)| {
+        let k = 1 + 2 * place;
+        let unit = (0.5 * (fit.inverse[(k, k)] + fit.inverse[(k + 1, k + 1)])).sqrt();
+        Line {
+            order: *order,
+            amplitude: value[k].hypot(value[k + 1]),
+            phase_rad: value[k + 1].atan2(value[k]),
+            amplitude_std: unit * noise,
+            confusion: unit * (n as f64 / 2.0).sqrt(),
+        }
+    };
+    Some((value[0], orders.iter().enumerate().map(line).collect()))
 }
 
-/// Standard deviation of each amplitude of sines for a noise of one in each row.
-fn amplitude_stds(fit: &Normal) -> Vec<f64> {
-    let of = |k: usize| 0.5 * (fit.inverse[(k, k)] + fit.inverse[(k + 1, k + 1)]);
-    (1..fit.right.len()).step_by(2).map(|k| of(k).sqrt()).collect()
+/// Values at angles (rad) without a constant and lines.
+pub(super) fn without(angle: &[f64], value: &[f64], (constant, lines): &(f64, Vec<Line>)) -> Vec<f64> {
+    let said = |angle: f64| constant + lines.iter().map(|line| line.at(angle)).sum::<f64>();
+    angle.iter().zip(value).map(|(angle, value)| value - said(*angle)).collect()
 }
 
 impl Line {

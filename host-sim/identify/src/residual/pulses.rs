@@ -22,7 +22,7 @@ const STANDS_OUT: f64 = 6.5;
 const FEWEST_TURNS: f64 = 6.0;
 
 /// A pulse at one position.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Pulse {
     /// The angle it stays at: ψ for the flexspline, ψ−δ for the circular spline.
     pub axis: Axis,
@@ -38,17 +38,18 @@ pub struct Pulse {
     pub height_std_arcsec: f64,
 }
 
-/// Pulses of a residual less its median in each direction, `centred`.
-pub(super) fn find(rows: &Rows, centred: &[f64]) -> Vec<Pulse> {
-    let mut found: Vec<Pulse> =
-        [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(rows, centred, axis)).collect();
-    // Both wheels turn almost alike: a pulse of one is a shadow on the other. The sharper one is meant.
-    let score = |pulse: &Pulse| (pulse.height_arcsec / pulse.height_std_arcsec).abs();
-    if found.len() == 2 {
-        let weaker = usize::from(score(&found[0]) > score(&found[1]));
-        found.remove(weaker);
+impl Pulse {
+    /// Its height in standard deviations.
+    fn stands_out(&self) -> f64 {
+        (self.height_arcsec / self.height_std_arcsec).abs()
     }
-    found
+}
+
+/// The pulse of a residual less its median in each direction, `centred`. Both wheels turn almost alike: a pulse of one
+/// is a shadow on the other, and the sharper one is meant.
+pub(super) fn find(rows: &Rows, centred: &[f64]) -> Vec<Pulse> {
+    let found = [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(rows, centred, axis));
+    found.max_by(|a, b| a.stands_out().total_cmp(&b.stands_out())).into_iter().collect()
 }
 
 fn on(rows: &Rows, centred: &[f64], axis: Axis) -> Option<Pulse> {
@@ -59,20 +60,30 @@ fn on(rows: &Rows, centred: &[f64], axis: Axis) -> Option<Pulse> {
     }
     // First and second half of the rows by themselves: a pulse is in both.
     let half = angle.len() / 2;
-    let whole = medians(&angle, centred);
-    let (first, second) = (medians(&angle[..half], &centred[..half]), medians(&angle[half..], &centred[half..]));
-    let best = best(&whole)?;
-    let again = |bins: &[(f64, f64)]| fit(bins, best.1, best.2, best.3).map(|(height, _)| height);
-    let (height, std) = best.0;
-    let agree = [again(&first), again(&second)].into_iter().all(|part| part.is_none_or(|part| part / height > 0.4));
-    agree.then(|| Pulse {
-        axis,
-        per_turn: best.3,
-        position_rad: best.1.rem_euclid(TAU / f64::from(best.3)),
-        width_rad: best.2,
-        height_arcsec: height,
-        height_std_arcsec: std,
-    })
+    let [whole, first, second] =
+        [0..angle.len(), 0..half, half..angle.len()].map(|part| medians(&angle[part.clone()], &centred[part]));
+    let mut best: Option<Pulse> = None;
+    for per_turn in [1, 2] {
+        for width_rad in WIDTHS_RAD {
+            for place in 0..BINS / per_turn as usize {
+                let at = Pulse { axis, per_turn, position_rad: middle(place), width_rad, ..Pulse::default() };
+                let Some(pulse) = fit(&whole, at) else { continue };
+                if pulse.stands_out() > best.map_or(STANDS_OUT, |best| best.stands_out()) {
+                    best = Some(pulse);
+                }
+            }
+        }
+    }
+    let in_both = |best: &Pulse| {
+        let height = |bins: &[(f64, f64)]| fit(bins, *best).map(|part| part.height_arcsec);
+        [height(&first), height(&second)].into_iter().flatten().all(|part| part / best.height_arcsec > 0.4)
+    };
+    best.filter(in_both)
+}
+
+/// Middle of a bin of a turn, rad.
+fn middle(bin: usize) -> f64 {
+    (bin as f64 + 0.5) / BINS as f64 * TAU
 }
 
 /// Median and number of rows in each bin of a turn.
@@ -84,48 +95,29 @@ fn medians(angle: &[f64], value: &[f64]) -> Vec<(f64, f64)> {
     bins.iter_mut().map(|values| (median_and_std(values).0, values.len() as f64)).collect()
 }
 
-type Found = ((f64, f64), f64, f64, u32);
-
-fn best(bins: &[(f64, f64)]) -> Option<Found> {
-    let mut best: Option<Found> = None;
-    for per_turn in [1, 2] {
-        for width in WIDTHS_RAD {
-            for place in 0..BINS / per_turn as usize {
-                let at = (place as f64 + 0.5) / BINS as f64 * TAU;
-                let Some((height, std)) = fit(bins, at, width, per_turn) else { continue };
-                let score = |(height, std): (f64, f64)| (height / std).abs();
-                if score((height, std)) > STANDS_OUT && best.is_none_or(|best| score((height, std)) > score(best.0)) {
-                    best = Some(((height, std), at, width, per_turn));
-                }
-            }
-        }
-    }
-    best
-}
-
-/// Height of a bell and its standard deviation, waves of low order fitted with it.
-fn fit(bins: &[(f64, f64)], at: f64, width: f64, per_turn: u32) -> Option<(f64, f64)> {
+/// The pulse with its height and the standard deviation of that, waves of low order fitted with it.
+fn fit(bins: &[(f64, f64)], pulse: Pulse) -> Option<Pulse> {
     const COLUMNS: usize = 2 + 2 * WAVES;
-    let period = TAU / f64::from(per_turn);
+    let period = TAU / f64::from(pulse.per_turn);
     let most = bins.iter().map(|bin| bin.1).fold(0.0, f64::max);
     let used = bins.iter().filter(|bin| bin.1 >= 1.0).count() as f64;
     if used < 0.9 * BINS as f64 {
         return None;
     }
     let fit = Normal::of(COLUMNS, bins.len(), |place, row| {
-        let (median, count) = bins[place];
-        let angle = (place as f64 + 0.5) / BINS as f64 * TAU;
-        let off = angle - at;
+        let ((median, count), angle) = (bins[place], middle(place));
+        let off = angle - pulse.position_rad;
         let off = off - period * (off / period).round();
         for wave in 0..WAVES {
             (row[1 + 2 * wave], row[2 + 2 * wave]) = ((wave + 1) as f64 * angle).sin_cos();
         }
-        row[COLUMNS - 1] = (-0.5 * (off / width).powi(2)).exp();
+        row[COLUMNS - 1] = (-0.5 * (off / pulse.width_rad).powi(2)).exp();
         // Beyond some rows in a bin, it is no longer their noise that matters.
         (median, if count < 1.0 { 0.0 } else { (count / most).sqrt() })
     })?;
     // Neighbouring bins share what is left over; a bell covers several of them.
-    let shared = (2.0 * width / (TAU / BINS as f64)).max(1.0) * PI.sqrt() / 2.0;
+    let shared = (2.0 * pulse.width_rad / (TAU / BINS as f64)).max(1.0) * PI.sqrt() / 2.0;
     let variance = fit.misfit() / (used - COLUMNS as f64) * shared.min(3.0);
-    Some((fit.values()[COLUMNS - 1], (variance * fit.inverse[(COLUMNS - 1, COLUMNS - 1)]).sqrt().max(1e-12)))
+    let std = (variance * fit.inverse[(COLUMNS - 1, COLUMNS - 1)]).sqrt().max(1e-12);
+    Some(Pulse { height_arcsec: fit.values()[COLUMNS - 1], height_std_arcsec: std, ..pulse })
 }

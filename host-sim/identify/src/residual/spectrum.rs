@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 use flexspline_algebra::{Complex, spectrum};
 use serde::Serialize;
 
-use super::orders::{Line, NamedOrder, confusion, harmonics, named_orders};
+use super::orders::{Line, NamedOrder, harmonics, named_orders, without};
 use super::rows::Axis;
 use crate::diagnosis::rows::sampled_twice;
 use crate::measurement::{least_and_most, median_of, sampled};
@@ -43,6 +43,8 @@ const HIGHEST_ORDER: f64 = 32.0;
 const FALSE_ALARM: f64 = 1e-3;
 /// Lines that are reported at most.
 const MOST_PEAKS: usize = 12;
+/// Halvings of the step in which a line is placed among others. *Guess*: to half a hundredth of a width.
+const HALVINGS: usize = 6;
 /// Points of the curve that are reported at most: of each stretch the highest.
 const MOST_POINTS: usize = 700;
 
@@ -112,32 +114,28 @@ pub fn order_spectrum(axis: Axis, angle: &[f64], value: &[f64], ratio: f64) -> O
     let mut noise = background(&orders, &scan, resolution);
     while found.len() < MOST_PEAKS {
         let free = |k: &usize| found.iter().all(|order| (orders[*k] - order).abs() > resolution);
-        let Some(best) =
-            (0..orders.len()).filter(free).max_by(|a, b| (scan[*a] / noise[*a]).total_cmp(&(scan[*b] / noise[*b])))
-        else {
-            break;
-        };
-        if scan[best] <= noise[best] * times {
-            break;
-        }
+        let over_noise = |k: &usize| scan[*k] / noise[*k];
+        let strongest = (0..orders.len()).filter(free).max_by(|a, b| over_noise(a).total_cmp(&over_noise(b)));
+        let Some(best) = strongest.filter(|best| over_noise(best) > times) else { break };
         found.push(summit(&orders, &scan, best));
         // Lines closer than three widths pull at each other: each is placed anew with the others taken out.
-        if crowded(&found, found.len() - 1, resolution) {
+        let crowded = |found: &[f64], k: usize| {
+            let near = |(j, order): (usize, &f64)| j != k && (order - found[k]).abs() < 3.0 * resolution;
+            found.iter().enumerate().any(near)
+        };
+        if crowded(&found, found.len() - 1) {
             for k in (0..found.len()).chain(0..found.len()) {
-                if crowded(&found, k, resolution) {
-                    let others: Vec<f64> =
-                        found.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, order)| *order).collect();
-                    found[k] = placed(angle, value, &others, found[k], resolution);
+                if crowded(&found, k) {
+                    let order = found.remove(k);
+                    found.insert(k, placed(angle, value, &found, order, resolution));
                 }
             }
         }
-        let Some((constant, lines)) = harmonics(angle, value, &found) else {
+        let Some(lines) = harmonics(angle, value, &found) else {
             found.pop();
             break;
         };
-        for ((left, value), x) in left.iter_mut().zip(value).zip(angle) {
-            *left = value - constant - lines.iter().map(|line| line.at(*x)).sum::<f64>();
-        }
+        left = without(angle, value, &lines);
         scan = grid.scan(&left);
         noise = background(&orders, &scan, resolution);
     }
@@ -146,57 +144,45 @@ pub fn order_spectrum(axis: Axis, angle: &[f64], value: &[f64], ratio: f64) -> O
     if !found.is_empty() {
         let red = grid.remembering(&left);
         noise.iter_mut().zip(&red).for_each(|(noise, red)| *noise = noise.max(*red));
-        if let Some((_, lines)) = harmonics(angle, value, &found) {
-            let stands = |line: &Line| {
-                let at = orders.partition_point(|order| *order < line.order).min(orders.len() - 1);
-                line.amplitude.powi(2) > noise[at] * times && line.order >= FEWEST_WAVES * resolution
-            };
-            found = lines.iter().filter(|line| stands(line)).map(|line| line.order).collect();
-        }
     }
-    let peaks = peaks(axis, angle, value, ratio, &found, &orders, &noise, resolution);
-    let (orders, amplitude_arcsec, level_arcsec) = thinned(&orders, &first, &noise, times);
-    OrderSpectrum { axis, turns, resolution, orders, amplitude_arcsec, level_arcsec, peaks }
-}
-
-#[allow(clippy::too_many_arguments, reason = "what the last step needs of all those before")]
-fn peaks(
-    axis: Axis,
-    angle: &[f64],
-    value: &[f64],
-    ratio: f64,
-    found: &[f64],
-    orders: &[f64],
-    noise: &[f64],
-    resolution: f64,
-) -> Vec<Peak> {
-    let Some((_, lines)) = harmonics(angle, value, found) else { return Vec::new() };
-    let confused = confusion(angle, found).unwrap_or_else(|| vec![1.0; found.len()]);
+    let noise_at = |order: f64| noise[orders.partition_point(|o| *o < order).min(orders.len() - 1)];
+    let stands =
+        |line: &Line| line.amplitude.powi(2) > noise_at(line.order) * times && line.order >= FEWEST_WAVES * resolution;
+    let lines = |orders: &[f64]| harmonics(angle, value, orders).map_or_else(Vec::new, |(_, lines)| lines);
+    let found: Vec<f64> = lines(&found).iter().filter(|line| stands(line)).map(|line| line.order).collect();
     let turns_of_axis = axis.turns_per_generator_turn(ratio).abs();
-    let mut peaks: Vec<Peak> = lines
-        .iter()
-        .enumerate()
-        .map(|(place, line)| {
-            let at = orders.partition_point(|order| *order < line.order).min(orders.len() - 1);
-            // Of a squared amplitude that noise gives, half belongs to each of sine and cosine. Lines that pull at each
-            // other are less certain, by as much as the joint fit says.
-            let std = (0.5 * noise[at]).sqrt() * confused[place].max(1.0);
-            let per_generator_turn = line.order * turns_of_axis;
-            let near =
-                |named: &NamedOrder| (named.per_generator_turn - per_generator_turn).abs() < resolution * turns_of_axis;
-            Peak {
-                order: line.order,
-                order_std: 3.0_f64.sqrt() * resolution / PI * std / line.amplitude,
-                amplitude_arcsec: line.amplitude,
-                phase_rad: line.phase_rad,
-                amplitude_std_arcsec: std,
-                phase_std_rad: std / line.amplitude,
-                named: named_orders(ratio).into_iter().filter(near).collect(),
-            }
-        })
-        .collect();
+    let peak = |line: &Line| {
+        // Of a squared amplitude that noise gives, half belongs to each of sine and cosine. Lines that pull at each
+        // other are less certain, by as much as the joint fit says.
+        let std = (0.5 * noise_at(line.order)).sqrt() * line.confusion.max(1.0);
+        let off = |named: &NamedOrder| (named.per_generator_turn - line.order * turns_of_axis).abs();
+        Peak {
+            order: line.order,
+            order_std: 3.0_f64.sqrt() * resolution / PI * std / line.amplitude,
+            amplitude_arcsec: line.amplitude,
+            phase_rad: line.phase_rad,
+            amplitude_std_arcsec: std,
+            phase_std_rad: std / line.amplitude,
+            named: named_orders(ratio).into_iter().filter(|named| off(named) < resolution * turns_of_axis).collect(),
+        }
+    };
+    let mut peaks: Vec<Peak> = lines(&found).iter().map(peak).collect();
     peaks.sort_by(|a, b| b.amplitude_arcsec.total_cmp(&a.amplitude_arcsec));
-    peaks
+    // Of each stretch of the curve the highest point.
+    let stretch = orders.len().div_ceil(MOST_POINTS).max(1);
+    let points: Vec<usize> = (0..orders.len())
+        .step_by(stretch)
+        .filter_map(|from| (from..(from + stretch).min(orders.len())).max_by(|a, b| first[*a].total_cmp(&first[*b])))
+        .collect();
+    OrderSpectrum {
+        axis,
+        turns,
+        resolution,
+        orders: points.iter().map(|k| orders[*k]).collect(),
+        amplitude_arcsec: points.iter().map(|k| first[*k].max(0.0).sqrt()).collect(),
+        level_arcsec: points.iter().map(|k| (noise[*k] * times).sqrt()).collect(),
+        peaks,
+    }
 }
 
 /// Rows shared out on a grid, and what of the spectrum depends on the angles alone.
@@ -329,36 +315,25 @@ fn background(orders: &[f64], scan: &[f64], resolution: f64) -> Vec<f64> {
     let n = orders.len();
     // At a few places, interpolated between.
     let knots = 96.min(n);
-    let at: Vec<usize> = (0..knots).map(|k| k * (n - 1) / (knots - 1).max(1)).collect();
-    let level: Vec<f64> = at
-        .iter()
-        .map(|place| {
-            let order = orders[*place];
-            let from = (order / AROUND).min(order - AROUND_WIDTHS * resolution);
-            let to = (order * AROUND).max(order + AROUND_WIDTHS * resolution);
-            let range = orders.partition_point(|o| *o < from)..orders.partition_point(|o| *o <= to);
-            let mut around = scan[range].to_vec();
-            let local = median_of(&mut around);
+    let level: Vec<f64> = (0..knots)
+        .map(|k| {
+            let order = orders[k * (n - 1) / (knots - 1).max(1)];
+            let median = |from: f64, to: f64| {
+                let range = orders.partition_point(|o| *o < from)..orders.partition_point(|o| *o <= to);
+                median_of(&mut scan[range].to_vec())
+            };
+            let (width, half) = (AROUND_WIDTHS * resolution, 0.5 * AROUND_WIDTHS * resolution);
+            let local = median((order / AROUND).min(order - width), (order * AROUND).max(order + width));
             // A slope of the noise within the window is met by its steeper side.
-            let half = (0.5 * AROUND_WIDTHS) * resolution;
-            let near = orders.partition_point(|o| *o < order - half)..orders.partition_point(|o| *o <= order + half);
-            let near = median_of(&mut scan[near].to_vec());
-            local.max(near) / std::f64::consts::LN_2
+            local.max(median(order - half, order + half)) / std::f64::consts::LN_2
         })
         .collect();
     let floor = level.iter().copied().fold(0.0, f64::max) * 1e-12 + 1e-300;
-    let mut knot = 0;
     (0..n)
         .map(|place| {
-            while knot + 2 < knots && place > at[knot + 1] {
-                knot += 1;
-            }
-            if knots < 2 {
-                return level[0].max(floor);
-            }
-            let width = (at[knot + 1] - at[knot]).max(1) as f64;
-            let part = (place - at[knot]) as f64 / width;
-            (level[knot] + part * (level[knot + 1] - level[knot])).max(floor)
+            let x = place as f64 * (knots - 1) as f64 / (n - 1).max(1) as f64;
+            let (below, above) = (level[x as usize], level[(x as usize + 1).min(knots - 1)]);
+            (below + x.fract() * (above - below)).max(floor)
         })
         .collect()
 }
@@ -374,50 +349,25 @@ fn summit(orders: &[f64], scan: &[f64], best: usize) -> f64 {
     orders[best] + off * (orders[best + 1] - orders[best])
 }
 
-/// Whether another order is within three widths.
-fn crowded(orders: &[f64], k: usize, resolution: f64) -> bool {
-    orders.iter().enumerate().any(|(j, order)| j != k && (order - orders[k]).abs() < 3.0 * resolution)
-}
-
-/// The order near `order` that, fitted together with others, explains most.
+/// The order within half a width of `order` that, fitted together with others, explains most.
 fn placed(angle: &[f64], value: &[f64], others: &[f64], order: f64, resolution: f64) -> f64 {
     let step = angle.len().div_ceil(2500).max(1);
     let x: Vec<f64> = angle.iter().copied().step_by(step).collect();
     let y: Vec<f64> = value.iter().copied().step_by(step).collect();
-    let explained = |order: f64| {
-        let mut orders = others.to_vec();
-        orders.push(order);
-        harmonics(&x, &y, &orders).map_or(f64::NEG_INFINITY, |(constant, lines)| {
-            let left = |k: usize| y[k] - constant - lines.iter().map(|line| line.at(x[k])).sum::<f64>();
-            -(0..x.len()).map(|k| left(k).powi(2)).sum::<f64>()
-        })
+    let misfit = |order: f64| {
+        let lines = harmonics(&x, &y, &[others, &[order]].concat());
+        lines.map_or(f64::INFINITY, |lines| without(&x, &y, &lines).iter().map(|left| left * left).sum())
     };
-    // Golden section within half a width; the summit is that wide.
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut a, mut b) = (order - 0.5 * resolution, order + 0.5 * resolution);
-    let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
-    let (mut fc, mut fd) = (explained(c), explained(d));
-    for _ in 0..9 {
-        if fc > fd {
-            (b, d, fd) = (d, c, fc);
-            c = b - golden * (b - a);
-            fc = explained(c);
-        } else {
-            (a, c, fc) = (c, d, fd);
-            d = a + golden * (b - a);
-            fd = explained(d);
+    // Steps of a quarter of a width, then halves of the step before.
+    let (mut best, mut least, mut by) = (order, misfit(order), 0.25 * resolution);
+    for _ in 0..HALVINGS {
+        for tried in [best - by, best + by] {
+            let misfit = misfit(tried);
+            if misfit < least {
+                (best, least) = (tried, misfit);
+            }
         }
+        by *= 0.5;
     }
-    0.5 * (a + b)
-}
-
-/// The curve with at most this many points; of those left out the highest stand.
-fn thinned(orders: &[f64], scan: &[f64], noise: &[f64], times: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let step = orders.len().div_ceil(MOST_POINTS).max(1);
-    let highest = (0..orders.len())
-        .step_by(step)
-        .filter_map(|from| (from..(from + step).min(orders.len())).max_by(|a, b| scan[*a].total_cmp(&scan[*b])));
-    let highest: Vec<usize> = highest.collect();
-    let of = |values: &dyn Fn(usize) -> f64| highest.iter().map(|k| values(*k)).collect();
-    (of(&|k| orders[k]), of(&|k| scan[k].max(0.0).sqrt()), of(&|k| (noise[k] * times).sqrt()))
+    best
 }
