@@ -45,11 +45,9 @@ struct Step {
     keep: f64,
     take: f64,
     /// Inverse standard deviation of the innovation.
-    worth: f64,
-    /// Standard deviation of the innovation, gain, and decay of the wander to the next average.
-    scale: f64,
-    gain: f64,
-    decay: f64,
+    weight: f64,
+    /// Share of what came that is white.
+    white: f64,
 }
 
 /// Columns that are whitened together. *Guess*: eight double values fill the widest vector registers (512 bits).
@@ -82,15 +80,15 @@ impl Whitener {
                 let loud = if rows.jitters { rms(&rows.loudness[rows_in.clone()]) } else { 1.0 };
                 let white = (white * loud).powi(2) / rows_in.len() as f64;
                 let innovation = variance + white;
-                let (gain, scale, mut decay) = (variance / innovation, innovation.sqrt(), 0.0);
+                let (gain, mut decay) = (variance / innovation, 0.0);
                 let after = variance * (1.0 - gain);
                 if g + 1 < session.end {
                     let dt = rows.time[groups[g + 1].start] - rows.time[rows_in.start];
                     decay = (-dt / noise.correlation_s).exp();
                     variance = decay * decay * after + power * (1.0 - decay * decay);
                 }
-                let (keep, take) = (decay * (1.0 - gain), decay * gain);
-                filter.push(Step { keep, take, worth: 1.0 / scale, scale, gain, decay });
+                let (keep, take, weight) = (decay * (1.0 - gain), decay * gain, 1.0 / innovation.sqrt());
+                filter.push(Step { keep, take, weight, white: 1.0 - gain });
             }
         }
         Whitener { groups, stride: stride.max(1), sessions, filter }
@@ -179,7 +177,7 @@ impl Whitener {
             for j in 0..ABREAST {
                 let value = from[j][g];
                 if let Some(white) = white[j].get_mut(g) {
-                    *white = (value - expected[j]) * step.worth;
+                    *white = (value - expected[j]) * step.weight;
                 }
                 expected[j] = step.keep * expected[j] + step.take * value;
             }
@@ -193,25 +191,17 @@ impl Whitener {
         self.whiten_averaged(&self.average(column))
     }
 
-    /// What the filter follows in averaged values: its estimate of the wander.
+    /// The filter's estimate of the wander in averaged values.
     #[must_use]
     pub(crate) fn followed(&self, averaged: &[f64]) -> Vec<f64> {
-        let mut wander = vec![0.0; averaged.len()];
-        for session in &self.sessions {
-            let mut expected = 0.0;
-            for g in session.clone() {
-                let Step { gain, decay, .. } = self.filter[g];
-                wander[g] = expected + gain * (averaged[g] - expected);
-                expected = decay * wander[g];
-            }
-        }
-        wander
+        let white = self.whiten_averaged(averaged).into_iter().zip(&self.filter);
+        averaged.iter().zip(white).map(|(value, (white, step))| value - step.white * white / step.weight).collect()
     }
 
     /// Sum of the logarithms of the innovations' standard deviations.
     #[must_use]
     pub(crate) fn log_scale(&self) -> f64 {
-        self.filter.iter().map(|step| step.scale.ln()).sum()
+        -self.filter.iter().map(|step| step.weight.ln()).sum::<f64>()
     }
 }
 

@@ -9,7 +9,7 @@ use super::candidate::{Acting, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
-use super::rows::{Rows, add_scaled};
+use super::rows::{Rows, combined};
 use super::select::{self, Selected, less};
 use super::thresholds::remainder::*;
 use crate::measurement::least_and_most;
@@ -29,18 +29,12 @@ pub struct SpectralLine {
 #[must_use]
 pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     let on = problem.on;
-    let mut sum = vec![0.0; on.rows.len()];
-    for (floating, c) in on.base.floating.iter().zip(selected.fit.base()) {
-        add_scaled(&mut sum, &floating.values, *c);
-    }
     let causes: Vec<Acting<'_>> =
         selected.terms.iter().enumerate().map(|(k, term)| term.acting(selected.fit.of(k))).collect();
-    for (k, columns) in together(on, &causes).into_iter().enumerate() {
-        for (column, c) in columns.iter().zip(selected.fit.of(k)) {
-            add_scaled(&mut sum, &column.values, *c);
-        }
-    }
-    sum
+    let of_causes = together(on, &causes);
+    let floating = on.base.floating.iter().map(|floating| floating.values.as_slice());
+    let columns = floating.chain(of_causes.iter().flatten().map(|column| column.values.as_slice()));
+    combined(on.rows.len(), columns, &selected.fit.solution.coefficients)
 }
 
 /// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
@@ -84,14 +78,10 @@ fn places(rows: &Rows, per: Per) -> (Cow<'_, [f64]>, f64) {
 
 /// Time of all sessions one after the other: gaps would only make a transform long.
 fn time_without_gaps(rows: &Rows) -> Vec<f64> {
-    let mut time = rows.time.clone();
-    let mut shift = 0.0;
-    for session in &rows.sessions {
-        let (first, last) = (time[session.start], time[session.end - 1]);
-        for t in &mut time[session.clone()] {
-            *t += shift - first;
-        }
-        shift += last - first + 1.0;
+    let (mut time, mut begin) = (rows.since.clone(), 0.0);
+    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
+        time[session.clone()].iter_mut().for_each(|since| *since += begin);
+        begin = time[session.end - 1] + 1.0;
     }
     time
 }
