@@ -156,43 +156,41 @@ pub struct Node {
     pub half_width_arcsec: f64,
 }
 
-/// Where the nodes of a part lie: what it is, its value, the state, and the coefficients of the part there.
-pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f64, Vec<f64>)> {
-    let [low, high] = scales.torque_n_m;
-    let [cold, warm] = scales.temperature_c;
+/// The nodes of a part: which quantity, its value, and the coefficients of the part there.
+fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f64, Vec<f64>)> {
+    let ([low, high], [cold, warm]) = (scales.torque_n_m, scales.temperature_c);
     let middle = State { temperature_c: f64::midpoint(cold, warm), way: 1.0, ..State::default() };
-    let turn = |count: usize| (0..count).map(|k| TAU * k as f64 / count as f64).collect();
-    let (of, values): (&'static str, Vec<f64>) = match part {
-        PartName::WindUp => ("torque_n_m", (0..9).map(|k| low + (high - low) * f64::from(k) / 8.0).collect()),
-        PartName::Play => ("torque_n_m", vec![low, 0.0, high]),
-        PartName::GeneratorAngle => ("generator_deg", turn(16)),
-        PartName::MaterialAngle => ("generator_against_output_deg", turn(16)),
-        PartName::ToothPitch => ("share_of_pitch_deg", turn(8)),
-        PartName::OutputAngle => ("output_deg", turn(24)),
-        PartName::Temperature => ("temperature_c", vec![cold, warm]),
-        PartName::ReadingDelay(_) => return Vec::new(),
+    let over = |of: &'static str, values: Vec<f64>, state: &dyn Fn(f64) -> State| {
+        let node = |value: f64| {
+            let mut x = Vec::new();
+            columns(part, &state(value), scales, &mut x);
+            if part == PartName::Temperature {
+                // The zero is the encoder's as much as the drive's.
+                x[0] = 0.0;
+            }
+            (of, if of.ends_with("_deg") { value.to_degrees() } else { value }, x)
+        };
+        values.into_iter().map(node).collect()
     };
-    let state = |value: f64| match part {
-        PartName::GeneratorAngle | PartName::MaterialAngle => State { generator_rad: value, ..middle },
-        PartName::ToothPitch => State { generator_rad: value / scales.teeth, ..middle },
-        PartName::OutputAngle => State { output_rad: value, ..middle },
+    let turn = |count: usize| (0..count).map(|k| TAU * k as f64 / count as f64).collect();
+    let torque = |torque_n_m: f64| State { torque_n_m, ..middle };
+    let generator = |generator_rad: f64| State { generator_rad, ..middle };
+    match part {
+        PartName::WindUp => {
+            over("torque_n_m", (0..9).map(|k| low + (high - low) * f64::from(k) / 8.0).collect(), &torque)
+        }
+        PartName::Play => over("torque_n_m", vec![low, 0.0, high], &torque),
+        PartName::GeneratorAngle => over("generator_deg", turn(16), &generator),
+        PartName::MaterialAngle => over("generator_against_output_deg", turn(16), &generator),
+        PartName::ToothPitch => over("share_of_pitch_deg", turn(8), &|share| generator(share / scales.teeth)),
+        PartName::OutputAngle => over("output_deg", turn(24), &|output_rad| State { output_rad, ..middle }),
         // Under the largest load: without one a temperature moves little but the zero.
         PartName::Temperature => {
-            let torque_n_m = if high.abs() >= low.abs() { high } else { low };
-            State { temperature_c: value, torque_n_m, ..middle }
+            let largest = torque(if high.abs() >= low.abs() { high } else { low });
+            over("temperature_c", vec![cold, warm], &|temperature_c| State { temperature_c, ..largest })
         }
-        _ => State { torque_n_m: value, ..middle },
-    };
-    let node = |value: f64| {
-        let mut x = Vec::new();
-        columns(part, &state(value), scales, &mut x);
-        if part == PartName::Temperature {
-            // The zero is the encoder's as much as the drive's.
-            x[0] = 0.0;
-        }
-        (of, if of.ends_with("_deg") { value.to_degrees() } else { value }, x)
-    };
-    values.into_iter().map(node).collect()
+        PartName::ReadingDelay(_) => Vec::new(),
+    }
 }
 
 /// The half widths of all nodes of some parts, from the covariance; in the order of the parts.
