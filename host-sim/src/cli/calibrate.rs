@@ -299,7 +299,7 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
         format!(
             "{:.2} arcsec from row to row and {:.2} besides",
             planned.noise.white_arcsec,
-            planned.noise.beside_white_arcsec()
+            planned.noise.lasting_arcsec()
         )
     } else {
         format!(

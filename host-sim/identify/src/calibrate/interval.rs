@@ -105,7 +105,7 @@ impl RowNoise {
         let squares: f64 = left.iter().flatten().map(|e| e * e).sum();
         let variance = squares / rows.saturating_sub(coefficients).max(1) as f64;
         let mut most = 1.0_f64;
-        // What neighbouring stretches have in common is no noise of single rows, nor of the steps of a resolution where
+        // The part that neighbouring stretches have in common is no noise of single rows, nor of the steps of a resolution where
         // they are longer than those; and it stays at its place.
         let mut common = 0.0_f64;
         for length in STRETCHES {
@@ -135,7 +135,7 @@ impl RowNoise {
     }
 
     /// Noise that stays at each place, arcsec: drift, and errors of no part.
-    pub fn beside_white_arcsec(&self) -> f64 {
+    pub fn lasting_arcsec(&self) -> f64 {
         (self.rms_arcsec.powi(2) - self.white_arcsec.powi(2)).max(0.0).sqrt()
     }
 }
@@ -219,7 +219,7 @@ fn usual_step(rows: &[Row], angle: fn(&State) -> f64) -> f64 {
     if steps.is_empty() { 0.0 } else { median_of(&mut steps) }
 }
 
-/// What a model leaves of the rows of each log about its mean, arcsec, and the noise in that.
+/// Residual of the rows of each log about its mean, arcsec, and the noise in it.
 pub(super) fn left_by(rows: &[Row], model: &Model, logs: usize, coarse_rad: f64) -> (Vec<Vec<f64>>, RowNoise) {
     let mut left = vec![Vec::new(); logs];
     rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
@@ -236,19 +236,19 @@ pub(super) fn left_by(rows: &[Row], model: &Model, logs: usize, coarse_rad: f64)
 
 /// How well a fitted model is known.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct ModelUncertainty {
     model: Model,
     /// The parts of the model, and the delay of each log.
     parts: Vec<PartName>,
     /// Of what the fit misses in their coefficients, arcsec².
     covariance: Vec<f64>,
-    /// What stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the fit.
+    /// Error that stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the fit.
     of_no_part_arcsec: f64,
     /// Noise of the rows.
     pub noise: RowNoise,
 }
 
-impl Known {
+impl ModelUncertainty {
     /// From the rows of the fit, of logs with these delays as numbers of their columns, which `rows` are without unless
     /// the model has them; `coarse_rad` is the step of the resolution at the output, and `left_out_arcsec` what fits
     /// leave in rows that were left out of them.
@@ -258,7 +258,7 @@ impl Known {
         delays: &[f64],
         coarse_rad: f64,
         left_out_arcsec: f64,
-    ) -> Option<Known> {
+    ) -> Option<ModelUncertainty> {
         let (scales, logs) = (&model.scales, delays.len());
         let (left, noise) = left_by(rows, model, logs, coarse_rad);
         let in_table = model.chosen.iter().filter(|chosen| !matches!(chosen.part, PartName::ReadingDelay(_)));
@@ -291,8 +291,8 @@ impl Known {
         let pairs = off.iter().flat_map(|a| off.iter().map(move |b| a * b));
         let covariance = after.covariance().iter().zip(pairs).map(|(of_one, pair)| of_a_row * of_one + pair).collect();
         let everywhere = RowNoise { rms_arcsec: noise.rms_arcsec.max(left_out_arcsec), ..noise };
-        let of_no_part_arcsec = everywhere.beside_white_arcsec();
-        Some(Known { model: model.clone(), parts, covariance, of_no_part_arcsec, noise })
+        let of_no_part_arcsec = everywhere.lasting_arcsec();
+        Some(ModelUncertainty { model: model.clone(), parts, covariance, of_no_part_arcsec, noise })
     }
 
     /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there,

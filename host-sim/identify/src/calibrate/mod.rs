@@ -36,7 +36,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
 use interval::OF_95;
-pub use interval::{Known, Node, RowNoise};
+pub use interval::{ModelUncertainty, Node, RowNoise};
 pub use parts::{PartName, Scales, State};
 pub use plan::{Bench, Pass, Planned, Wide, plan};
 pub use prior::Prior;
@@ -285,7 +285,7 @@ fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> Vec<State> {
 }
 
 /// Says so where the load goes with the output's angle.
-fn load_with_angle(rows: &Rows, known: &Known) -> Option<String> {
+fn load_with_angle(rows: &Rows, known: &ModelUncertainty) -> Option<String> {
     let correlation = rows.load_with_output_angle();
     let ends = known.nodes().into_iter().filter(|node| node.part == PartName::WindUp.as_str());
     let widest = ends.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
@@ -377,7 +377,7 @@ pub struct Calibrated {
     /// The table.
     pub table: MadeTable,
     /// How well it is known.
-    pub known: Known,
+    pub known: ModelUncertainty,
     rows: Rows,
     recorded: Recorded,
     /// Rows for a picture: output angle (rad), measured and left by the model (arcsec).
@@ -642,7 +642,7 @@ impl<'a> FittedTable<'a> {
         let none = || vec![0.0; files.len()];
         let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
         let left_out_arcsec = held_out.rms_after_arcsec;
-        let known = Known::of(&rows.rows, &model, &delays, recorded.coarse_rad, left_out_arcsec)
+        let known = ModelUncertainty::of(&rows.rows, &model, &delays, recorded.coarse_rad, left_out_arcsec)
             .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
         // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
         // paces that were recorded.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
 use super::folds::{Chosen, Row};
-use super::interval::{Known, OF_95, left_by};
+use super::interval::{ModelUncertainty, OF_95, left_by};
 use super::parts::{PartName, Scales, expected_arcsec};
 use super::rows::{Recorded, Rows, settled, speeds_rad_s};
 use super::{Model, Prior};
@@ -99,7 +99,7 @@ impl Delays {
             Some(Model { coefficients: folds.coefficients(chosen, &[])?, chosen: chosen.to_vec(), scales })
         };
         let none = vec![0.0; logs];
-        let known = |model: &Model| Known::of(&rows.rows, model, &none, recorded.coarse_rad, 0.0);
+        let known = |model: &Model| ModelUncertainty::of(&rows.rows, model, &none, recorded.coarse_rad, 0.0);
         // Of noise as large as the delays make it they would be held back.
         let (_, noise) = left_by(&rows.rows, &model(&chosen)?, logs, recorded.coarse_rad);
         let of_a_row = noise.of_a_row() / rows.rows.len() as f64;

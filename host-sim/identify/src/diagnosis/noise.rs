@@ -36,12 +36,12 @@ pub(crate) struct Whitener {
     /// Averages of each session.
     pub sessions: Vec<std::ops::Range<usize>>,
     /// The filter at each average.
-    filter: Vec<Step>,
+    filter: Vec<FilterStep>,
 }
 
 /// One step of the filter: what is expected next is `keep` of what was expected now and `take` of what came.
 #[derive(Clone, Copy, Debug)]
-struct Step {
+struct FilterStep {
     keep: f64,
     take: f64,
     /// Inverse standard deviation of the innovation.
@@ -88,7 +88,7 @@ impl Whitener {
                     variance = decay * decay * after + power * (1.0 - decay * decay);
                 }
                 let (keep, take, weight) = (decay * (1.0 - gain), decay * gain, 1.0 / innovation.sqrt());
-                filter.push(Step { keep, take, weight, white: 1.0 - gain });
+                filter.push(FilterStep { keep, take, weight, white: 1.0 - gain });
             }
         }
         Whitener { groups, stride: stride.max(1), sessions, filter }

@@ -17,15 +17,15 @@ use crate::measurement::least_and_most;
 /// A line in the spectrum of the residual.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpectralLine {
-    /// What it is counted against.
+    /// Turn or second in which its periods are counted.
     pub per: Per,
-    /// Periods per unit.
+    /// Periods in one.
     pub order: f64,
     /// Power in units of what white noise has on average.
     pub power: f64,
 }
 
-/// What base and terms explain beside the nominal prediction, row by row, arcsec.
+/// The part of the error that base and terms explain in addition to the nominal prediction, row by row, arcsec.
 #[must_use]
 pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     let on = problem.on;
@@ -67,7 +67,7 @@ pub(crate) fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f
     by_angle.into_iter().chain(rows.recorded.time.then(in_time).flatten()).collect()
 }
 
-/// Where the rows stand in what a line is counted against, rad or s, and one unit of it.
+/// The angle (rad) or time (s) of each row in which a line repeats, and one turn or second of it.
 fn places(rows: &Rows, per: Per) -> (Cow<'_, [f64]>, f64) {
     match per {
         Per::Second => (Cow::Owned(time_without_gaps(rows)), 1.0),
@@ -119,7 +119,7 @@ pub(crate) fn averaged_away(problem: &Problem<'_>, line: &SpectralLine) -> bool 
     problem.whitener.hides(&wave)
 }
 
-/// What is left as a free function of what was measured, largest first.
+/// Residual that goes as a free function of a measured quantity, largest first.
 #[must_use]
 pub(crate) fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], white: f64) -> Vec<Unexplained> {
     use rayon::prelude::*;

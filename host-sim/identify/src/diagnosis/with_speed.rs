@@ -117,7 +117,7 @@ pub(super) fn with_speed(
     Some(WithSpeed { speeds, amplitudes: [slow, fast], stds: [slow_std, fast_std] })
 }
 
-/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares beside a mean.
+/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares with a free mean.
 /// The deviation is that of white noise, or that by blocks of neighbouring rows (a sandwich), whichever is larger:
 /// wander and other lines are alike from row to row.
 fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
@@ -138,7 +138,7 @@ fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize)
     let amplitude = cosine.hypot(sine);
     let left = |wave: &[f64; 4]| wave[3] - mean - cosine * wave[1] - sine * wave[2];
     let white = robust_std(waves.iter().map(left)) * (2.0 / count).sqrt();
-    // What a block adds to the amplitude that was found.
+    // Contribution of a block to the amplitude found.
     let added = |block: &[[f64; 4]]| -> f64 {
         let scores = [0, 1, 2].map(|of: usize| block.iter().map(|wave| wave[of] * left(wave)).sum::<f64>());
         let [c, s] = [1, 2].map(|a: usize| (0..3).map(|b: usize| inverse[(a, b)] * scores[b]).sum::<f64>());
@@ -149,8 +149,8 @@ fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize)
     Some((amplitude, white.max(by_blocks)))
 }
 
-/// What is said of lines of the generator's angle beside their name: of terms of a model, and of lines that averages
-/// hide.
+/// Sentences on spectral lines of the generator angle, with their names: of terms of a model, and of lines that
+/// averages hide.
 pub(super) fn words(
     problem: &Problem<'_>,
     selected: &Selected<'_>,
@@ -186,8 +186,8 @@ mod tests {
         let rows: Vec<usize> = (0..24_000).collect();
         let angle = |k: usize| 0.37 * k as f64;
         // Out of step with the wave by four turns over all rows.
-        let beside = |k: usize| (angle(k) + std::f64::consts::TAU * 4.0 * k as f64 / 24_000.0).sin();
-        let (found, std) = amplitude(&rows, angle, |k| 3.0 * angle(k).sin() + beside(k)).unwrap();
+        let other = |k: usize| (angle(k) + std::f64::consts::TAU * 4.0 * k as f64 / 24_000.0).sin();
+        let (found, std) = amplitude(&rows, angle, |k| 3.0 * angle(k).sin() + other(k)).unwrap();
         // White noise of that size would leave 0.007.
         assert!((found - 3.0).abs() < 3.0 * std && (0.05..0.3).contains(&std), "{found} ± {std}");
     }

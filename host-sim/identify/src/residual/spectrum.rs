@@ -304,7 +304,7 @@ impl Grid<'_> {
             let scan = self.scan(&surrogate);
             level.iter_mut().zip(scan).for_each(|(level, scan)| *level += scan / f64::from(SURROGATES));
         }
-        // What the lines found took with them belongs to the noise as well.
+        // Noise that the lines found took with them belongs to the noise as well.
         level.iter().map(|level| TAKEN * level).collect()
     }
 }
