@@ -286,11 +286,12 @@ impl DiagnosisKnown<'_> {
         blocks.extend(self.lines("drift", "Over time", caption, self.time_axis(), |shown| {
             let mut points: Vec<[f64; 2]> = Vec::new();
             for (session, begin) in rows.sessions.iter().zip(&self.clock.begins) {
-                if let Some([x, _]) = points.last() {
+                if let Some([x, _]) = points.last().copied() {
                     points.push([0.5 * (x + begin), f64::NAN]);
                 }
                 let values = &shown.level.residual_arcsec;
-                points.extend(medians(&self.clock.at, values, session.clone(), MEDIANS, FEWEST_IN_MEDIAN));
+                let stretches = MEDIANS.min(session.len() / (2 * FEWEST_IN_MEDIAN)).max(1);
+                points.extend(medians(&self.clock.at, values, session.clone(), stretches, FEWEST_IN_MEDIAN));
             }
             let series = vec![ChartSeries::new("median", Mark::Broken, 0, points)];
             Some(Lines { series, uprights: self.clock.borders(), ..Lines::default() })
