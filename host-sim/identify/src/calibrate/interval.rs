@@ -105,8 +105,8 @@ impl RowNoise {
         let squares: f64 = left.iter().flatten().map(|e| e * e).sum();
         let variance = squares / rows.saturating_sub(coefficients).max(1) as f64;
         let mut most = 1.0_f64;
-        // The part that neighbouring stretches have in common is no noise of single rows, nor of the steps of a resolution where
-        // they are longer than those; and it stays at its place.
+        // The part that neighbouring stretches have in common is no noise of single rows, nor of the steps of a
+        // resolution where they are longer than those; and it stays at its place.
         let mut common = 0.0_f64;
         for length in STRETCHES {
             let means: Vec<f64> = left
@@ -242,7 +242,8 @@ pub struct ModelUncertainty {
     parts: Vec<PartName>,
     /// Of what the fit misses in their coefficients, arcsec².
     covariance: Vec<f64>,
-    /// Error that stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the fit.
+    /// Error that stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the
+    /// fit.
     of_no_part_arcsec: f64,
     /// Noise of the rows.
     pub noise: RowNoise,

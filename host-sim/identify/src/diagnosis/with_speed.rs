@@ -117,7 +117,7 @@ pub(super) fn with_speed(
     Some(WithSpeed { speeds, amplitudes: [slow, fast], stds: [slow_std, fast_std] })
 }
 
-/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares with a free mean.
+/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares, the mean free.
 /// The deviation is that of white noise, or that by blocks of neighbouring rows (a sandwich), whichever is larger:
 /// wander and other lines are alike from row to row.
 fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {

@@ -1,7 +1,7 @@
 //! The picture before the verdict: what a residual (measured less model) looks like, before anybody says why.
 //!
-//! Its orders over the angle of each wheel with their uncertainty. Everything is in arc-seconds at the output, angles in
-//! radians, and can be written as JSON.
+//! Its orders over the angle of each wheel with their uncertainty. Everything is in arc-seconds at the output, angles
+//! in radians, and can be written as JSON.
 //!
 //! Three angles matter in a strain wave gear. The contact passes the flexspline once in a generator turn (ψ), the
 //! circular spline once in ψ−δ, which is 94/95 of it for a ratio of 95, and whatever sits on the output turns with δ.
