@@ -13,8 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flexspline::Table;
 
 use super::flank_lag::{behind, flank_lag};
-use super::rows::{Rows, combined, rms};
-use crate::linear::{Gram, Prior, solve};
+use super::rows::Rows;
+use crate::least_squares::FreeSpan;
 use crate::nominal::Nominal;
 use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -283,20 +283,10 @@ impl Base {
 /// ratio are taken out before: any drive may have them, whatever its play does, and they would decide between the laws.
 fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
     let used: Vec<usize> = rows.sessions_used().flatten().collect();
-    let of = |column: &[f64]| -> Vec<f64> {
-        let values: Vec<f64> = used.iter().map(|k| column[*k]).collect();
-        let size = rms(&values).max(1e-9);
-        values.into_iter().map(|value| value / size).collect()
-    };
-    let columns = [vec![1.0; used.len()], of(&rows.speed), of(&rows.output)];
-    let data: Vec<f64> = used.iter().map(|k| left[*k]).collect();
-    let views: Vec<&[f64]> = columns.iter().chain([&data]).map(Vec::as_slice).collect();
-    let priors = [Prior { mean: 0.0, std: 1e3 * rms(&data).max(1e-9) }; 3];
-    let free =
-        solve(&Gram::of(&views, 0..used.len()), &priors, 1.0).map_or(vec![0.0; 3], |solution| solution.coefficients);
-    let explained = combined(used.len(), columns.iter().map(Vec::as_slice), &free);
-    let inside = (0..used.len()).filter(|j| rows.torque[used[*j]].abs() <= friction);
-    inside.map(|j| (data[j] - explained[j]).powi(2)).sum()
+    let of = |column: &[f64]| -> Vec<f64> { used.iter().map(|k| column[*k]).collect() };
+    let free = FreeSpan::default().beyond([vec![1.0; used.len()], of(&rows.speed), of(&rows.output)]);
+    let inside = used.iter().zip(free.freed(of(left))).filter(|(k, _)| rows.torque[**k].abs() <= friction);
+    inside.map(|(_, left)| left.powi(2)).sum()
 }
 
 /// What a table predicts over the rows under a torque, arcsec.
@@ -312,22 +302,16 @@ pub(super) fn predicted_by_table(rows: &Rows, torque: &[f64], table: &Table<'_>)
 }
 
 fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec<bool> {
-    let by_load = uncertain_by_load(rows, nominal, flank);
-    if few(&by_load) {
-        return by_load;
-    }
-    // Where hardly any load says which flank carries, the motion does, …
-    let by_motion = (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal));
-    if let Some(by_motion) = by_motion.filter(|uncertain| few(uncertain)) {
-        return by_motion;
-    }
-    // … or nothing says it but at the beginning. Sessions without a load are set aside as a whole, unless too little is
-    // left then.
-    [true, false]
-        .into_iter()
-        .map(|unloaded_too| uncertain_at_first(rows, nominal, unloaded_too))
-        .find(|at_first| few(at_first))
-        .unwrap_or_else(|| vec![false; rows.len()])
+    // Where hardly any load says which flank carries, the motion does, or nothing says it but at the beginning. Sessions
+    // without a load are set aside as a whole, unless too little is left then.
+    let ways: [&dyn Fn() -> Option<Vec<bool>>; 4] = [
+        &|| Some(uncertain_by_load(rows, nominal, flank)),
+        &|| (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal)),
+        &|| Some(uncertain_at_first(rows, nominal, true)),
+        &|| Some(uncertain_at_first(rows, nominal, false)),
+    ];
+    let found = ways.iter().filter_map(|way| way()).find(|uncertain| few(uncertain));
+    found.unwrap_or_else(|| vec![false; rows.len()])
 }
 
 /// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left. Of a

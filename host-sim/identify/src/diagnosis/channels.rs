@@ -54,7 +54,7 @@ const CUT: f64 = 5.0;
 const MOST_GOES_ON: f64 = 0.9;
 
 /// Rows that are used, about this many, spread evenly.
-pub(super) fn sample(rows: &Rows, count: usize) -> Vec<usize> {
+fn sample(rows: &Rows, count: usize) -> Vec<usize> {
     let used: Vec<usize> = rows.sessions_used().flatten().collect();
     used.iter().copied().step_by(used.len().div_ceil(count).max(1)).collect()
 }
@@ -66,7 +66,7 @@ pub(super) fn waves(order: f64, angle: &[f64], places: &[usize]) -> [Vec<f64>; 2
 
 /// What floats freely in every drive, column by column at the places: zeros of the error and of sessions, ratio, speed,
 /// direction, nominal harmonics, and two orders of the output.
-pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<Vec<f64>> {
+fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<Vec<f64>> {
     let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { places.iter().map(|k| value(*k)).collect() };
     let mut columns = vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
     for session in rows.sessions.iter().skip(1).take(MOST_ZEROS) {
@@ -81,21 +81,52 @@ pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<
     columns
 }
 
-/// An orthonormal basis of the smooth part of an error at some places: of the columns of [`floating`] and of the first
-/// two orders of both wheels.
-pub(super) fn smooth_span(rows: &Rows, nominal: &Nominal, places: &[usize]) -> FreeSpan {
-    let mut columns = floating(rows, nominal, places);
-    for order in [1.0, 2.0] {
-        columns.extend(waves(order, &rows.on_flexspline, places));
-        columns.extend(waves(order, &rows.on_circular_spline, places));
+/// A sample of the rows with the nominal model over it, under any torque, and a basis of what floats freely.
+pub(super) struct Sampled<'a> {
+    rows: &'a Rows,
+    against: (&'a Nominal, Option<&'a Table<'a>>),
+    /// The rows.
+    pub places: Vec<usize>,
+    /// What floats.
+    pub free: FreeSpan,
+}
+
+impl<'a> Sampled<'a> {
+    /// Of about `count` rows; the columns that `further` gives at the places float as well.
+    pub fn new(
+        rows: &'a Rows,
+        against: (&'a Nominal, Option<&'a Table<'a>>),
+        count: usize,
+        further: impl FnOnce(&[usize]) -> Vec<Vec<f64>>,
+    ) -> Sampled<'a> {
+        let places = sample(rows, count);
+        let columns = floating(rows, against.0, &places).into_iter().chain(further(&places));
+        Sampled { rows, against, free: FreeSpan::default().beyond(columns), places }
     }
-    FreeSpan::default().beyond(columns)
+
+    /// A column of all rows at the places.
+    pub fn at(&self, column: &[f64]) -> Vec<f64> {
+        self.places.iter().map(|k| column[*k]).collect()
+    }
+
+    /// Wind-up, half the clearance on the flank that carries, and what a table predicts apart from them, at the places
+    /// under a torque of all rows, arcsec. Without a table the rest is the harmonics, which float.
+    pub fn parts(&self, law: PlayLaw, torque: &[f64]) -> [Vec<f64>; 3] {
+        let (nominal, table) = self.against;
+        let half = 0.5 * nominal.backlash_arcsec;
+        let wind_up: Vec<f64> = self.places.iter().map(|k| nominal.wind_up_arcsec(torque[*k])).collect();
+        let mut play = self.at(&law.flanks(self.rows, torque, nominal));
+        play.iter_mut().for_each(|flank| *flank *= half);
+        let all = table.map(|table| self.at(&predicted_by_table(self.rows, torque, table)));
+        let rest = |(k, predicted): (usize, f64)| predicted - wind_up[k] - play[k];
+        let rest = all.map_or_else(|| vec![0.0; play.len()], |all| all.into_iter().enumerate().map(rest).collect());
+        [wind_up, play, rest]
+    }
 }
 
 /// A sample of the rows with what floats freely taken out of their error.
-struct Freed {
-    places: Vec<usize>,
-    span: FreeSpan,
+struct Freed<'a> {
+    sampled: Sampled<'a>,
     error: Vec<f64>,
 }
 
@@ -106,24 +137,17 @@ fn spread(error: &[f64]) -> f64 {
     quantile(blocks.map(|block| robust_std(block.iter().copied())), MOST_GOES_ON)
 }
 
-impl Freed {
+impl<'a> Freed<'a> {
     /// With `further` columns of all rows among what floats.
-    fn new(rows: &Rows, nominal: &Nominal, further: &[Vec<f64>]) -> Freed {
-        let places = sample(rows, SAMPLE);
-        let mut columns = floating(rows, nominal, &places);
-        columns.extend(waves(1.0, &rows.generator, &places));
-        columns.extend(further.iter().map(|column| places.iter().map(|k| column[*k]).collect()));
-        let span = FreeSpan::default().beyond(columns);
-        let mut freed = Freed { error: Vec::new(), span, places };
-        freed.error = freed.freed(&rows.error);
-        let spread = spread(&freed.error);
-        freed.error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
-        freed
-    }
-
-    /// The part of a column of all rows that is orthogonal to what floats freely, at the places.
-    fn freed(&self, column: &[f64]) -> Vec<f64> {
-        self.span.freed(self.places.iter().map(|k| column[*k]).collect())
+    fn new(rows: &'a Rows, against: (&'a Nominal, Option<&'a Table<'a>>), further: &[Vec<f64>]) -> Freed<'a> {
+        let sampled = Sampled::new(rows, against, SAMPLE, |places| {
+            let further = further.iter().map(|column| places.iter().map(|k| column[*k]).collect());
+            waves(1.0, &rows.generator, places).into_iter().chain(further).collect()
+        });
+        let mut error = sampled.free.freed(sampled.at(&rows.error));
+        let spread = spread(&error);
+        error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
+        Freed { sampled, error }
     }
 }
 
@@ -139,29 +163,22 @@ struct Told {
     left: f64,
     /// Share of the wind-up alone, whatever the clearance is: that follows the sign of a torque in any unit.
     wind_up: f64,
-    /// Half the clearance alone, arcsec.
+    /// Share of the clearance alone.
     clearance: f64,
 }
 
 impl Told {
     /// By nominal wind-up and clearance under `scale` times the recorded torque.
-    fn by(rows: &Rows, (nominal, table): (&Nominal, Option<&Table<'_>>), freed: &Freed, scale: f64) -> Told {
-        let torque: Vec<f64> = rows.torque.iter().map(|torque| scale * torque).collect();
-        let flank = PlayLaw::Held.flanks(rows, &torque, nominal);
-        let half = 0.5 * nominal.backlash_arcsec;
-        let wound: Vec<f64> = torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
-        let should: Vec<f64> = wound.iter().zip(&flank).map(|(wound, flank)| wound + half * flank).collect();
-        let mut error = freed.error.clone();
-        if let Some(table) = table {
-            // What the table says beside them: ripple, which the load shapes.
-            let all = predicted_by_table(rows, &torque, table);
-            let ripple: Vec<f64> = all.iter().zip(&should).map(|(all, should)| all - should).collect();
-            error.iter_mut().zip(freed.freed(&ripple)).for_each(|(error, ripple)| *error -= ripple);
-        }
-        let [wound, flank] = [wound, flank].map(|column| freed.freed(&column));
-        let wind_up = share_beside(&error, &wound, &flank);
-        let clearance = share_beside(&error, &flank, &wound);
-        let should = freed.freed(&should);
+    fn by(freed: &Freed<'_>, scale: f64) -> Told {
+        let Freed { sampled, error } = freed;
+        let torque: Vec<f64> = sampled.rows.torque.iter().map(|torque| scale * torque).collect();
+        let parts = sampled.parts(PlayLaw::Held, &torque).map(|part| sampled.free.freed(part));
+        let [wound, play, rest] = parts;
+        // What a table says apart from them is ripple, which the load shapes.
+        let error: Vec<f64> = error.iter().zip(&rest).map(|(error, rest)| error - rest).collect();
+        let wind_up = share_beside(&error, &wound, &play);
+        let clearance = share_beside(&error, &play, &wound);
+        let should: Vec<f64> = wound.iter().zip(&play).map(|(wound, play)| wound + play).collect();
         let products: Vec<[f64; 2]> = should
             .chunks(should.len().div_ceil(BLOCKS).max(1))
             .zip(error.chunks(should.len().div_ceil(BLOCKS).max(1)))
@@ -211,12 +228,12 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
         return None;
     }
-    let freed = Freed::new(&rows, nominal, &[]);
+    let freed = Freed::new(&rows, (nominal, table), &[]);
     let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
     let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
     let seen = |told: &Told| told.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
     let none = robust_std(freed.error.iter().copied());
-    let told = |scale: f64| Told::by(&rows, (nominal, table), &freed, scale);
+    let told = |scale: f64| Told::by(&freed, scale);
     let recorded = told(1.0);
     let of_this_drive = |told: &Told| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.share) && told.is_certain();
     let too_soft = recorded.wind_up > FAR_TOO_SOFT;
@@ -323,18 +340,19 @@ pub(crate) fn check_degrees(
     if said || !rows.recorded.torque || nominal.wind_up_arcsec(1.0) == 0.0 {
         return Ok(());
     }
-    let told = Told::by(&rows, (nominal, table), &Freed::new(&rows, nominal, &[]), 1.0);
+    let told = Told::by(&Freed::new(&rows, (nominal, table), &[]), 1.0);
     let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
     let wave = nominal.harmonics.iter().max_by(by_size).map(|wave| {
         // A load that is put on in steps while the generator turns a little looks like a wave: it goes first.
         let wound = rows.torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
-        let freed = Freed::new(&rows, nominal, &[wound, PlayLaw::Held.flanks(&rows, &rows.torque, nominal)]);
-        let [sine, cosine] = waves(wave.order_per_generator_turn / DEGREES, &rows.generator, &freed.places)
-            .map(|wave| freed.span.freed(wave));
-        let [sine, cosine] = [(&sine, &cosine), (&cosine, &sine)].map(|(a, b)| share_beside(&freed.error, a, b));
+        let further = [wound, PlayLaw::Held.flanks(&rows, &rows.torque, nominal)];
+        let Freed { sampled, error } = Freed::new(&rows, (nominal, table), &further);
+        let [sine, cosine] = waves(wave.order_per_generator_turn / DEGREES, &rows.generator, &sampled.places)
+            .map(|wave| sampled.free.freed(wave));
+        let [sine, cosine] = [(&sine, &cosine), (&cosine, &sine)].map(|(a, b)| share_beside(&error, a, b));
         sine.hypot(cosine) / wave.amplitude_arcsec
     });
-    let clearance = (nominal.backlash_arcsec > 0.0).then(|| 2.0 * told.clearance / nominal.backlash_arcsec);
+    let clearance = (nominal.backlash_arcsec > 0.0).then_some(told.clearance);
     let degrees = |share: f64, [low, high]: [f64; 2]| (low * DEGREES..=high * DEGREES).contains(&share);
     let mut others = [wave, clearance].into_iter().flatten().peekable();
     let Some(other) = others.peek().copied() else { return Ok(()) };

@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::base::{FLANK_S, WIDER};
 use super::rows::Rows;
 use super::thresholds::rivals::TOLD_APART;
+use crate::least_squares::FreeSpan;
 use flexspline_base::robust::dot;
 
 /// Each lag that is tried is this many times the one before, from [`FLANK_S`] on. *Guess*: two to an octave.
@@ -87,17 +88,11 @@ fn windows(rows: &Rows, flank: &[f64]) -> Vec<Range<usize>> {
 
 /// Values of windows less the straight line in each.
 fn straightened(values: &[f64], windows: &[Range<usize>]) -> Vec<f64> {
-    windows.iter().flat_map(|window| straight(&values[window.clone()])).collect()
-}
-
-fn straight(values: &[f64]) -> Vec<f64> {
-    let middle = 0.5 * (values.len() as f64 - 1.0);
-    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let at = |k: usize| k as f64 - middle;
-    let square: f64 = (0..values.len()).map(|k| at(k).powi(2)).sum();
-    let along: f64 = values.iter().enumerate().map(|(k, value)| at(k) * value).sum();
-    let slope = if square > 0.0 { along / square } else { 0.0 };
-    values.iter().enumerate().map(|(k, value)| value - mean - slope * at(k)).collect()
+    let straight = |window: &Range<usize>| {
+        let line = [vec![1.0; window.len()], (0..window.len()).map(|k| k as f64).collect()];
+        FreeSpan::default().beyond(line).freed(values[window.clone()].to_vec())
+    };
+    windows.iter().flat_map(straight).collect()
 }
 
 #[cfg(test)]

@@ -9,10 +9,10 @@
 
 use flexspline::Table;
 
-use super::base::{PlayLaw, predicted_by_table};
-use super::channels::{BLOCKS, report, sample, smooth_span};
+use super::base::PlayLaw;
+use super::channels::{BLOCKS, Sampled, report, waves};
 use super::rows::{Rows, mean, rms};
-use crate::least_squares::{FreeSpan, jackknife};
+use crate::least_squares::jackknife;
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
 
@@ -57,33 +57,29 @@ const FAR_LESS: f64 = 0.8;
 /// half the least that counts.
 const RIVAL_STEPS: [f64; 2] = [0.04, 0.002];
 
-/// What the model leaves of the error, row by row, under a torque that is not the one recorded.
-struct Held<'a> {
-    rows: Rows,
-    nominal: &'a Nominal,
-    table: Option<&'a Table<'a>>,
+/// What the model leaves of the error under a torque that is not the one recorded.
+struct Other<'a> {
+    rows: &'a Rows,
+    /// The rows that are compared, with the smooth part of the error of any drive.
+    sampled: Sampled<'a>,
     law: PlayLaw,
     /// Sine and cosine of the angle against gravity, in each row.
     turned: Vec<(f64, f64)>,
-    /// The rows that are compared.
-    places: Vec<usize>,
-    /// The nominal harmonics there, arcsec.
-    harmonics: Vec<f64>,
-    /// The smooth part of the error of any drive.
-    free: FreeSpan,
 }
 
-/// A load beside that of the torque column: a constant, an unbalanced load (sine and cosine), a drag. N·m.
+/// A load in addition to that of the torque column: a constant, an unbalanced load (sine and cosine), a drag. N·m.
 type Beside = [f64; 4];
 
-impl<'a> Held<'a> {
-    fn new(rows: Rows, nominal: &'a Nominal, table: Option<&'a Table<'a>>) -> Held<'a> {
-        let places = sample(&rows, SAMPLE);
+impl<'a> Other<'a> {
+    fn new(rows: &'a Rows, nominal: &'a Nominal, table: Option<&'a Table<'a>>) -> Other<'a> {
+        let sampled = Sampled::new(rows, (nominal, table), SAMPLE, |places| {
+            let wheels = [&rows.on_flexspline, &rows.on_circular_spline];
+            let orders = [1.0, 2.0].into_iter().flat_map(|order| wheels.map(|wheel| waves(order, wheel, places)));
+            orders.flatten().collect()
+        });
         let turned =
             rows.output.iter().zip(&rows.orientation).map(|(out, housing)| (out + housing).sin_cos()).collect();
-        let harmonics = places.iter().map(|k| nominal.harmonics_arcsec(rows.generator[*k])).collect();
-        let free = smooth_span(&rows, nominal, &places);
-        Held { rows, nominal, table, law: PlayLaw::Held, turned, places, harmonics, free }
+        Other { rows, sampled, law: PlayLaw::Held, turned }
     }
 
     /// Takes the law of the play that leaves least at any of some zeros, and gives what each of them leaves by it,
@@ -115,30 +111,21 @@ impl<'a> Held<'a> {
 
     /// By a law of the play; the spring may be stiffer one way than the other where it is `by_sign`.
     fn of_law(&self, law: PlayLaw, [constant, sine, cosine, drag]: Beside, by_sign: bool) -> Vec<f64> {
-        let rows = &self.rows;
+        let rows = self.rows;
         let torque: Vec<f64> = (0..rows.len())
             .map(|k| {
                 let (sin, cos) = self.turned[k];
                 rows.torque[k] + constant + sine * sin + cosine * cos + drag * rows.direction[k]
             })
             .collect();
-        let flank = law.flanks(rows, &torque, self.nominal);
-        let half = 0.5 * self.nominal.backlash_arcsec;
-        let wind_up: Vec<f64> = self.places.iter().map(|k| self.nominal.wind_up_arcsec(torque[*k])).collect();
-        let flank: Vec<f64> = self.places.iter().map(|k| half * flank[*k]).collect();
-        let predicted: Vec<f64> = match self.table {
-            Some(table) => {
-                let all = predicted_by_table(rows, &torque, table);
-                self.places.iter().map(|k| all[*k]).collect()
-            }
-            None => (0..self.places.len()).map(|j| wind_up[j] + flank[j] + self.harmonics[j]).collect(),
-        };
-        let left = self.places.iter().zip(&predicted).map(|(k, predicted)| rows.error[*k] - predicted).collect();
-        // Stiffness and backlash float as well.
+        let [wind_up, play, rest] = self.sampled.parts(law, &torque);
+        let left = self.sampled.at(&rows.error).into_iter().zip(rest).map(|(error, rest)| error - rest).collect();
+        // Stiffness and backlash float as well: all that they predict.
         let by_sign = by_sign.then(|| wind_up.iter().map(|arcsec| arcsec.abs()).collect());
-        let floats = self.free.beyond([wind_up, flank].into_iter().chain(by_sign));
-        floats.freed(self.free.freed(left))
+        let free = &self.sampled.free;
+        free.beyond([wind_up, play].into_iter().chain(by_sign)).freed(free.freed(left))
     }
+
     /// What is left, block by block, under a torque less `zero` where the spring may be stiffer one way than the other.
     fn by_sign(&self, zero: f64) -> Vec<f64> {
         by_block(&self.of_law(self.law, [-zero, 0.0, 0.0, 0.0], true))
@@ -150,7 +137,7 @@ impl<'a> Held<'a> {
         let left = |beside: Beside| self.left(beside).iter().map(|v| v.abs()).sum::<f64>();
         let (mut at, mut least) = (from, left(from));
         let mut step = RIVAL_STEPS[0] * load;
-        let round_off = ROUND_OFF_ARCSEC * self.places.len() as f64;
+        let round_off = ROUND_OFF_ARCSEC * self.sampled.places.len() as f64;
         for _ in 0..MOST_ROUNDS {
             // Written so that a residual that is not a number ends it.
             if !(step > RIVAL_STEPS[1] * load && least > round_off) {
@@ -231,12 +218,12 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     if !rows.recorded.torque || load == 0.0 || nominal.wind_up_arcsec(1.0) == 0.0 || rows.count_used() < SAMPLE / 4 {
         return None;
     }
-    let mut held = Held::new(rows, nominal, table);
+    let mut other = Other::new(&rows, nominal, table);
     let steps = (LARGEST_SHARE / STEP_SHARE).round() as i32;
     let mut step = STEP_SHARE * load;
     let zeros: Vec<f64> = (-steps..=steps).map(|k| f64::from(k) * step).collect();
-    let (mut tries, without_any) = held.with_zeros(&zeros);
-    let left = |zero: f64| by_block(&held.left([-zero, 0.0, 0.0, 0.0]));
+    let (mut tries, without_any) = other.with_zeros(&zeros);
+    let left = |zero: f64| by_block(&other.left([-zero, 0.0, 0.0, 0.0]));
     for _ in 0..HALVINGS {
         step *= 0.5;
         let best = least(&tries, None);
@@ -258,7 +245,7 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
         return None;
     }
     let least = sum(there);
-    let by_rivals = held.least_beside([0.0; 4], false, load);
+    let by_rivals = other.least_beside([0.0; 4], false, load);
     let rivals = sum(&by_rivals);
     // They have three numbers to its one: they are there only where they leave less, for certain, and by more than the
     // lag of flanks and other trifles, of which three numbers always tell a part.
@@ -266,14 +253,14 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
         sum(than) < share * least && is_certain(there, than, CERTAIN) && least - sum(than) > NO_TRIFLE * gain
     };
     if better(&by_rivals, RIVALS_LEAVE)
-        || better(&held.by_sign(0.0), RIVALS_LEAVE)
-        || better(&held.by_sign(zero), BESIDE_IT_LEAVE)
-        || better(&held.least_beside([-zero, 0.0, 0.0, 0.0], true, load), BESIDE_IT_LEAVE)
+        || better(&other.by_sign(0.0), RIVALS_LEAVE)
+        || better(&other.by_sign(zero), BESIDE_IT_LEAVE)
+        || better(&other.least_beside([-zero, 0.0, 0.0, 0.0], true, load), BESIDE_IT_LEAVE)
     {
         return None;
     }
     let may_be_unbalance = rivals * RIVALS_LEAVE < least;
-    let (with, without) = (held.left([-zero, 0.0, 0.0, 0.0]), held.left([0.0; 4]));
+    let (with, without) = (other.left([-zero, 0.0, 0.0, 0.0]), other.left([0.0; 4]));
     let moved: Vec<f64> = with.iter().zip(&without).map(|(with, without)| with - without).collect();
     Some(Zero { n_m: zero, std, size_arcsec: rms(&moved), may_be_unbalance })
 }
@@ -431,9 +418,9 @@ mod tests {
             std::thread::spawn(move || {
                 let rows = Rows::new(&[session], &nominal);
                 let load = rows.load_scale();
-                let mut held = Held::new(rows, &nominal, None);
-                held.with_zeros(&[0.0]);
-                let left = [held.least_beside([0.0; 4], false, load), held.least_beside([0.0; 4], true, load)];
+                let mut other = Other::new(&rows, &nominal, None);
+                other.with_zeros(&[0.0]);
+                let left = [other.least_beside([0.0; 4], false, load), other.least_beside([0.0; 4], true, load)];
                 send.send(left).unwrap();
             });
             let ended = receive.recv_timeout(std::time::Duration::from_secs(120));
