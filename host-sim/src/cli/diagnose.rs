@@ -17,7 +17,7 @@ use flexspline_identify::diagnosis::pipeline::{
     Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, read_rows,
 };
 use flexspline_identify::diagnosis::report::{Compensation, Diagnosis};
-use flexspline_identify::extension::Model;
+use flexspline_identify::extension::{Compensated, Model};
 use flexspline_identify::measurement::Recording;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -225,18 +225,22 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     let _ = writeln!(text, "{}", extension.table.text());
     text += &diagnosis.text();
     if let Some(evaluation) = &extension.compensation {
-        text += "pointing error the core leaves in sessions held out, arcsec rms\n  session      rows   no table    \
-                 nominal calibrated   extended\n";
-        let mut line = |name: String, rows: usize, left: &Compensation| {
+        text += "pointing error the core leaves in sessions held out, arcsec rms\n             sessions      rows   no \
+                 table    nominal calibrated   extended\n";
+        let sessions = &evaluation.sessions;
+        let mut line = |name: String, sessions: usize, rows: usize, left: &Compensation| {
             let calibrated = left.rms_calibrated_table_arcsec.map_or("–".to_owned(), |left| format!("{left:.2}"));
             let _ = writeln!(
                 text,
-                "  {name:>7} {rows:>9} {:>10.2} {:>10.2} {calibrated:>10} {:>10.2}",
+                "  {name:<11} {sessions:>7} {rows:>9} {:>10.2} {:>10.2} {calibrated:>10} {:>10.2}",
                 left.rms_uncompensated_arcsec, left.rms_nominal_tables_arcsec, left.rms_extended_tables_arcsec
             );
         };
-        evaluation.sessions.iter().for_each(|s| line((s.session + 1).to_string(), s.rows, &s.left));
-        line("all".to_owned(), evaluation.sessions.iter().map(|s| s.rows).sum(), &evaluation.left);
+        line("all".to_owned(), sessions.len(), sessions.iter().map(|s| s.rows).sum(), &evaluation.left);
+        let extended = |s: &&Compensated| s.left.rms_extended_tables_arcsec;
+        if let Some(worst) = sessions.iter().max_by(|a, b| extended(a).total_cmp(&extended(b))) {
+            line(format!("worst, {}", worst.session + 1), 1, worst.rows, &worst.left);
+        }
         for left in &evaluation.not_applied {
             let _ = writeln!(text, "  not in the tables: {}, {}", left.cause, left.reason);
         }

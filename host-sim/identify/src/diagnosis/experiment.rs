@@ -6,18 +6,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use super::Fineness;
 use super::base::Base;
 use super::candidate::{Excitation, Law};
 use super::model::{Problem, Scaffold, Term};
-use super::noise::{Noise, Whitener};
+use super::noise::Noise;
 use super::rows::{Rows, add_scaled, quantile};
 use crate::measurement::Session;
-
-/// One run: text, and session by session how it is driven at `share` (0 to 1) of its time.
-struct Run {
-    text: &'static str,
-    sessions: Vec<fn(f64) -> State>,
-}
 
 /// Generator turns, torque in units of the load scale, K above nominal, orientation.
 struct State {
@@ -45,59 +40,56 @@ fn steps(share: f64) -> f64 {
     [0.3, -0.3, 1.0, -1.0, 0.1, -0.1, 0.6, -0.6][((share * 16.0) as usize) % 8]
 }
 
-fn run<const N: usize>(text: &'static str, sessions: [fn(f64) -> State; N]) -> Run {
-    Run { text, sessions: sessions.to_vec() }
-}
-
-fn menu() -> Vec<Run> {
+/// Runs: what to do, and session by session how the drive is driven at a share (0 to 1) of its time.
+static MENU: [(&str, &[fn(f64) -> State]); 6] = {
     const fn state(turns: f64, torque: f64, warmer: f64, orientation: f64) -> State {
         State { turns, torque, warmer, orientation }
     }
-    vec![
-        run(
+    [
+        (
             "one output turn forward and back at steady torque, once with either sign",
-            [|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)],
+            &[|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)],
         ),
-        run(
+        (
             "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, \
              90 and 180 degrees",
-            [
+            &[
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, 0.0),
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, FRAC_PI_2),
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, PI),
             ],
         ),
-        run(
+        (
             "torque triangles of three amplitudes through zero, generator creeping",
-            [|s| {
+            &[|s| {
                 let amplitude = [0.15, 0.4, 1.0][((s * 3.0) as usize).min(2)];
                 let triangle = 2.0 / PI * (TAU * 12.0 * s).sin().asin();
                 state(2.0 * s, amplitude * triangle, 0.0, 0.0)
             }],
         ),
-        run(
+        (
             "a cold, a hot and again a cold soak, torque steps of both signs at each, slow and fast in both directions",
-            [
+            &[
                 |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
                 |s| state(30.0 * there_and_back(s) * s, steps(s), 35.0, 0.0),
                 |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
             ],
         ),
-        run(
+        (
             "constant speeds from slow to fast in both directions, torque through zero in between",
-            [|s| {
+            &[|s| {
                 let run = (s * 8.0).floor();
                 let speed = [0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0][(run as usize).min(7)];
                 let before: f64 = [0.0, 0.1, 0.0, 0.3, 0.0, 0.6, 0.0, 1.0][(run as usize).min(7)];
                 state(15.0 * (before + speed * (8.0 * s - run)), 0.7 * (TAU * 10.0 * s).sin(), 0.0, 0.0)
             }],
         ),
-        run(
+        (
             "torque steps of both signs with the generator at rest, recorded as fast as the encoder allows",
-            [|s| state(0.01 * s, steps(s), 0.0, 0.0)],
+            &[|s| state(0.01 * s, steps(s), 0.0, 0.0)],
         ),
     ]
-}
+};
 
 /// Speeds that differ by less than this factor are one speed. *Guess*.
 const ONE_SPEED: f64 = 1.5;
@@ -153,24 +145,24 @@ pub fn next(
     noise: Noise,
 ) -> Option<(String, f64)> {
     use rayon::prelude::*;
-    let runs = menu();
-    let apart: Vec<f64> =
-        runs.par_iter().map(|run| least_apart(on, run, term, coefficients, alike, noise).unwrap_or(0.0)).collect();
-    let best = (0..runs.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b]))?;
-    (apart[best] > WORTH_IT).then(|| (runs[best].text.to_owned(), apart[best]))
+    let apart = |(text, run): &(&'static str, &[fn(f64) -> State])| {
+        (*text, least_apart(on, run, term, coefficients, alike, noise).unwrap_or(0.0))
+    };
+    let all: Vec<(&str, f64)> = MENU.par_iter().map(apart).collect();
+    let (text, apart) = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (apart > WORTH_IT).then(|| (text.to_owned(), apart))
 }
 
 /// Standard deviations by which the closest of `alike` misses what `term` would do on a run.
 fn least_apart(
     on: &Excitation<'_>,
-    run: &Run,
+    run: &[fn(f64) -> State],
     term: &Term<'_>,
     coefficients: &[f64],
     alike: &[&Law],
     noise: Noise,
 ) -> Option<f64> {
     let sessions: Vec<Session> = run
-        .sessions
         .iter()
         .enumerate()
         .map(|(k, at)| {
@@ -198,7 +190,7 @@ fn least_apart(
     }
     rows.error = truth;
     let imagined = Excitation { rows: &rows, base: &base, ..*on };
-    let problem = Problem::new(&imagined, &base.uncertain, Whitener::new(&rows, &base.uncertain, 1, noise), 1.0, None);
+    let problem = Problem::new(&imagined, &base.uncertain, Fineness { stride: 1, noise, worth: 1.0 }, None);
     let scaffold = Scaffold::new(&problem, Vec::new());
     let own = scaffold.fit(Some(&Term::new(&problem, term.law, term.places.clone())))?.solution.misfit;
     let mut least = f64::INFINITY;

@@ -3,37 +3,41 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use serde::ser::{SerializeMap, Serializer};
 
-use super::candidate::Label;
-use super::report::{Cause, Diagnosis};
+use super::report::Diagnosis;
 use super::trace::{Entries, Gate, Judged, Stage, Step};
 use crate::causes::CauseName;
 
 /// Why a cause was named, or was not.
+#[derive(Serialize)]
 pub struct Explanation<'a> {
+    schema_version: u32,
     /// The cause.
     pub cause: CauseName,
-    /// It as it was named.
-    pub named: Option<&'a Cause>,
-    /// The decision against it; none for a cause that is named.
-    pub stopped: Option<&'a Step>,
-    /// Causes named that these data do not tell it from.
-    pub alike: Vec<CauseName>,
-    /// Rise of the misfit with it in the place of each cause named.
-    pub in_place_of: Vec<(CauseName, f64)>,
-    /// What to record, or to give, to learn more of it.
-    pub record: Vec<String>,
+    /// Whether it was named.
+    pub named: bool,
+    /// Why, in a sentence or two.
+    because: String,
     /// Gain of evidence where it was last measured.
-    pub evidence: Option<f64>,
+    evidence: Option<f64>,
     /// Its size where it was last measured, arcsec rms.
-    pub size_arcsec: Option<f64>,
-    /// The decisions that tell of it.
-    pub steps: Vec<&'a Step>,
+    size_arcsec: Option<f64>,
+    /// If it was named its look-alikes, else the causes named that these data do not tell it from.
+    look_alikes: Vec<CauseName>,
+    /// What to record, or to give, to learn more of it.
+    record: Vec<String>,
+    /// The decisions on it.
+    trace: Entries<'a>,
+    /// The decision against it; none for a cause that is named.
+    #[serde(skip)]
+    pub stopped: Option<&'a Step>,
+    /// Rise of the misfit with it in the place of each cause named.
+    #[serde(skip)]
+    in_place_of: Vec<(CauseName, f64)>,
 }
 
 impl<'a> Explanation<'a> {
-    /// What a diagnosis says of a cause.
+    /// Reads out of a diagnosis what it says of a cause.
     #[must_use]
     pub fn of(diagnosis: &'a Diagnosis, cause: CauseName) -> Explanation<'a> {
         let trace = &diagnosis.trace;
@@ -44,99 +48,79 @@ impl<'a> Explanation<'a> {
             steps.iter().rev().find_map(of)
         };
         let stopped = if named.is_some() { None } else { trace.stopped(cause) };
-        let alike: Vec<CauseName> = diagnosis
-            .causes
-            .iter()
-            .filter(|found| found.look_alikes.contains(&cause))
-            .map(|found| found.name)
-            .collect();
-        let rival = |step: &&Step| step.stage == Stage::Rival && step.gates.iter().any(|j| j.gate == Gate::AsRival);
-        let in_place_of = steps
-            .iter()
-            .copied()
-            .filter(|step| rival(step))
-            .filter_map(|step| Some((step.against?.cause()?, step.gates.first()?.value?)))
-            .filter(|(of, _)| diagnosis.causes.iter().any(|found| found.name == *of))
-            .collect();
-        let need = stopped.and_then(|step| {
-            step.gates.iter().find_map(|judged| match judged.gate {
-                Gate::Needs(need) => Some(need),
-                _ => None,
-            })
+        let look_alikes = match named {
+            Some(found) => found.look_alikes.clone(),
+            None => {
+                let alike = diagnosis.causes.iter().filter(|found| found.look_alikes.contains(&cause));
+                alike.map(|found| found.name).collect()
+            }
+        };
+        let need = stopped.into_iter().flat_map(|step| &step.gates).find_map(|judged| match judged.gate {
+            Gate::Needs(need) => Some(need),
+            _ => None,
         });
         let mut record: Vec<String> = need.and_then(|need| need.remedy()).map(str::to_owned).into_iter().collect();
-        if named.is_some_and(|found| !found.look_alikes.is_empty()) || !alike.is_empty() {
+        if !look_alikes.is_empty() {
             record.extend(diagnosis.next_experiment.clone());
         }
         if named.is_none() && record.is_empty() {
             record.extend(diagnosis.experiment_for_asked.clone());
         }
+        let as_rival = |step: &&Step| match step.gates[..] {
+            [Judged { gate: Gate::AsRival, value: Some(rise), .. }] => Some((step.against?.cause()?, rise)),
+            _ => None,
+        };
+        let is_named = |(of, _): &(CauseName, f64)| diagnosis.causes.iter().any(|found| found.name == *of);
+        let in_place_of = steps.iter().filter_map(as_rival).filter(is_named).collect();
+        let because = match named {
+            Some(found) => {
+                let alike = if look_alikes.is_empty() { "" } else { "; these data do not tell it from others" };
+                format!("It is named, with a confidence of {:.0} %{alike}.", 100.0 * found.confidence)
+            }
+            None => not_named(stopped, &look_alikes),
+        };
+        let (evidence, size_arcsec) = (last(&[Gate::Evidence]), last(&[Gate::Size, Gate::SizeIfClear]));
+        let (named, trace) = (named.is_some(), Entries(steps));
         Explanation {
+            schema_version: 1,
             cause,
             named,
-            stopped,
-            alike,
-            in_place_of,
+            because,
+            evidence,
+            size_arcsec,
+            look_alikes,
             record,
-            evidence: last(&[Gate::Evidence]),
-            size_arcsec: last(&[Gate::Size, Gate::SizeIfClear]),
-            steps,
+            trace,
+            stopped,
+            in_place_of,
         }
-    }
-
-    /// Why, in a sentence or two.
-    #[must_use]
-    pub(crate) fn because(&self) -> String {
-        if let Some(found) = self.named {
-            let alike = if found.look_alikes.is_empty() { "" } else { "; these data do not tell it from others" };
-            return format!("It is named, with a confidence of {:.0} %{alike}.", 100.0 * found.confidence);
-        }
-        let Some(step) = self.stopped else {
-            return "It is not named: the search never came to it.".to_owned();
-        };
-        let Some(judged) = step.deciding() else { return "It is not named.".to_owned() };
-        if let Gate::Needs(need) = judged.gate {
-            return format!("These data cannot speak of it: {}.", need.missing());
-        }
-        let mut text = format!("It is not named: {}", where_it_fell(step));
-        let _ = write!(text, " it did not hold that it {}", judged.gate.asks());
-        if let Some(numbers) = numbers(judged) {
-            let _ = write!(text, ": {numbers}");
-        }
-        if let (Some(against), Gate::First | Gate::Refined) = (step.against, judged.gate) {
-            let _ = write!(text, "; {against} was taken");
-        }
-        text.push('.');
-        if !self.alike.is_empty() {
-            let _ = write!(text, " These data do not tell it from {}, which is named.", names(&self.alike));
-        }
-        text
     }
 
     /// One screen.
     #[must_use]
     pub fn text(&self) -> String {
         let mut text = format!("{}: {}, {}\n", self.cause, self.cause.words(), self.cause.does());
-        let _ = writeln!(text, "{}", self.because());
+        let _ = writeln!(text, "{}", self.because);
         if let (Some(evidence), Some(size)) = (self.evidence, self.size_arcsec) {
             let _ = writeln!(text, "evidence {evidence:.1}, size {size:.2} arcsec rms where it was last measured");
         }
         for (of, rise) in &self.in_place_of {
             let verb = if *rise < 0.0 { "lowers" } else { "raises" };
+            let rise = rise.abs();
             let _ = writeln!(
                 text,
-                "in the place of {of} it {verb} the misfit by {:.0} (25 are five standard deviations)",
-                rise.abs()
+                "in the place of {of} it {verb} the misfit by {rise:.0} (25 are five standard deviations)"
             );
         }
-        let told = self.steps.iter().filter(|step| step.stage != Stage::Data && !is_plain_rival(step));
+        let Entries(steps) = &self.trace;
+        let told = steps.iter().filter(|step| step.stage != Stage::Data && !is_plain_rival(step));
         for (shown, step) in told.enumerate() {
             if shown == MOST_STEPS {
                 text.push_str("  ... the rest is in diagnosis.json under trace\n");
                 break;
             }
             let round = if step.round > 0 { format!(", round {}", step.round) } else { String::new() };
-            let against = step.against.map_or_else(String::new, |label: Label| format!(", against {label}"));
+            let against = step.against.map_or_else(String::new, |label| format!(", against {label}"));
             let _ = writeln!(text, "  {}{round}{against}:", step.stage.words());
             for judged in &step.gates {
                 let sign = if judged.passed { '+' } else { '-' };
@@ -163,7 +147,7 @@ fn is_plain_rival(step: &Step) -> bool {
 #[must_use]
 pub fn numbers(judged: &Judged) -> Option<String> {
     let (value, limit) = (judged.value?, judged.limit?);
-    let more = if judged.gate.is_below() { "less" } else { "more" };
+    let more = if judged.is_below { "less" } else { "more" };
     Some(format!("found {}, asked for {more} than {}", number(value), number(limit)))
 }
 
@@ -172,32 +156,29 @@ fn number(value: f64) -> String {
     if value.abs() >= 100.0 { format!("{value:.0}") } else { format!("{value:.2}") }
 }
 
-fn where_it_fell(step: &Step) -> String {
+/// Why a cause was not named: the decision against it, and the causes named that it is not told from.
+fn not_named(stopped: Option<&Step>, alike: &[CauseName]) -> String {
+    let Some(step) = stopped else { return "It is not named: the search never came to it.".to_owned() };
+    let Some(judged) = step.deciding() else { return "It is not named.".to_owned() };
+    if let Gate::Needs(need) = judged.gate {
+        return format!("These data cannot speak of it: {}.", need.missing());
+    }
+    let mut text = format!("It is not named: {}", step.stage.words());
     match step.against {
-        Some(against) if step.stage == Stage::Exchange || step.stage == Stage::Rival => {
-            format!("{} ({against}),", step.stage.words())
-        }
-        _ => format!("{},", step.stage.words()),
+        Some(against) if matches!(step.stage, Stage::Exchange | Stage::Rival) => text += &format!(" ({against})"),
+        _ => {}
     }
-}
-
-fn names(causes: &[CauseName]) -> String {
-    causes.iter().map(|cause| cause.as_str()).collect::<Vec<_>>().join(", ")
-}
-
-impl Serialize for Explanation<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("schema_version", &1)?;
-        map.serialize_entry("cause", &self.cause)?;
-        map.serialize_entry("named", &self.named.is_some())?;
-        map.serialize_entry("because", &self.because())?;
-        map.serialize_entry("evidence", &self.evidence)?;
-        map.serialize_entry("size_arcsec", &self.size_arcsec)?;
-        let alike = self.named.map_or(&self.alike, |found| &found.look_alikes);
-        map.serialize_entry("look_alikes", alike)?;
-        map.serialize_entry("record", &self.record)?;
-        map.serialize_entry("trace", &Entries(self.steps.clone()))?;
-        map.end()
+    let _ = write!(text, ", it did not hold that it {}", judged.gate.asks());
+    if let Some(numbers) = numbers(judged) {
+        let _ = write!(text, ": {numbers}");
     }
+    if let (Some(against), Gate::First | Gate::Refined) = (step.against, judged.gate) {
+        let _ = write!(text, "; {against} was taken");
+    }
+    text.push('.');
+    if !alike.is_empty() {
+        let names: Vec<&str> = alike.iter().map(|cause| cause.as_str()).collect();
+        let _ = write!(text, " These data do not tell it from {}, which is named.", names.join(", "));
+    }
+    text
 }

@@ -12,11 +12,10 @@ use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
 use super::candidate::{Acting, Excitation, Law, LawUnits, Regressor, Tag, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
-use super::noise::Whitener;
 use super::report::Parameter;
 use super::resolution::averages_hide;
 use super::rows::{Rows, add_scaled};
-use super::select::{Selected, fixed, less, settle_all};
+use super::select::{Selected, fixed, less, settle_each};
 use super::thinned::{Sample, Thinned};
 use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
 use crate::causes::{CauseName, ParameterName};
@@ -166,22 +165,10 @@ pub struct Series {
 }
 
 impl Series {
-    /// Measured less nominal, arcsec.
+    /// Measured less a prediction, arcsec.
     #[must_use]
-    pub fn less_nominal(&self) -> Vec<f64> {
-        less(&self.measured_arcsec, &self.nominal_arcsec)
-    }
-
-    /// Measured less recalibrated, arcsec.
-    #[must_use]
-    pub fn less_recalibrated(&self) -> Vec<f64> {
-        less(&self.measured_arcsec, &self.recalibrated_arcsec)
-    }
-
-    /// Measured less extended, arcsec.
-    #[must_use]
-    pub fn less_extended(&self) -> Vec<f64> {
-        less(&self.measured_arcsec, &self.extended_arcsec)
+    pub fn less(&self, predicted: &[f64]) -> Vec<f64> {
+        less(&self.measured_arcsec, predicted)
     }
 }
 
@@ -211,19 +198,18 @@ impl Extended {
         if averages_hide(&on, &laws, causes, &uncertain, stride) {
             stride = 1;
         }
-        let averaged = Averaged::of(&on, stride).map(Arc::new);
-        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth, averaged);
-        let start = match Thinned::of(&on, stride) {
-            Some(thinned) => {
-                let sample = Sample::new(&on, &thinned, &uncertain, stride);
-                let terms = super::remembered(&laws, &fixed(&sample.problem(noise, worth), &laws, causes));
-                let terms = terms_at(&problem, &laws, &terms);
-                let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
-                super::remembered(&laws, &settle_all(&problem, selected).ok_or(DiagnosisError::NotFinite)?.terms)
-            }
-            None => super::remembered(&laws, &fixed(&problem, &laws, causes)),
-        };
-        Extended::of(&problem, laws, &start, Fineness { stride, noise, worth }).ok_or(DiagnosisError::NotFinite)
+        let fineness = Fineness { stride, noise, worth };
+        let problem = Problem::new(&on, &uncertain, fineness, Averaged::of(&on, stride).map(Arc::new));
+        let thinned = Thinned::of(&on, stride);
+        let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &uncertain, stride));
+        let on_sample = sample.as_ref().map(|sample| sample.problem(noise, worth));
+        let mut start = super::remembered(&laws, &fixed(on_sample.as_ref().unwrap_or(&problem), &laws, causes));
+        if on_sample.is_some() {
+            let selected = Selected::of(&problem, terms_at(&problem, &laws, &start));
+            let settled = selected.and_then(|selected| settle_each(&problem, selected, false));
+            start = super::remembered(&laws, &settled.ok_or(DiagnosisError::NotFinite)?.terms);
+        }
+        Extended::of(&problem, laws, &start, fineness).ok_or(DiagnosisError::NotFinite)
     }
 
     /// Fits the laws at `start` (index and places), and the nominal model alone.

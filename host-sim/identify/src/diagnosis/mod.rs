@@ -62,7 +62,7 @@ pub use explain::Explanation;
 pub(crate) use extended::nominal_arcsec;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
 use model::{Problem, Term, terms_at};
-use noise::{Noise, Whitener};
+use noise::Noise;
 pub use pipeline::{
     Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, WrittenTable, diagnose_rows,
     parse_rows, read_rows,
@@ -181,18 +181,19 @@ pub(crate) fn diagnose_extended(
     let scales = LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
     let on = Excitation::new(&rows, nominal, &base, &scales);
     progress(1, 4, "causes");
-    let search = Search::new(&on, settings)?;
+    let (search, trace) = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
-    let Search { laws, problem, noise, stride, thinned, start, bests, fast, trace } = search;
-    let terms = terms_at(&problem, &laws, &start);
-    let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
-    let mut start = remembered(&laws, &selected.terms);
+    let Problem { noise, worth, whitener, .. } = &search.problem;
+    let (problem, fineness) = (&search.problem, Fineness { stride: whitener.stride, noise: *noise, worth: *worth });
+    let terms = terms_at(problem, &search.laws, &search.start);
+    let selected = Selected::of(problem, terms).ok_or(DiagnosisError::NotFinite)?;
+    let mut start = remembered(&search.laws, &selected.terms);
     let maps = candidate::maps(&on);
-    let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
-    let hidden_lines: Vec<Label> = fast.iter().map(|(label, _)| *label).collect();
-    let fast = fast.into_iter().map(|(label, size_arcsec)| Unexplained { looks_like: label.to_string(), size_arcsec });
+    let mut left = remainder::of_maps(problem, &selected, &maps, noise.white);
+    let fast = search.fast.iter();
+    let fast = fast.map(|(label, size)| Unexplained { looks_like: label.to_string(), size_arcsec: *size });
     left.extend(fast.filter(|line| line.size_arcsec > select::least_size(noise.white)));
-    left.extend(remainder::beyond_noise(&problem, &selected, noise));
+    left.extend(remainder::beyond_noise(problem, &selected, *noise));
     for (k, term) in selected.terms.iter().enumerate() {
         let (label, [main, nuisance, beside]) = (term.law.label, select::parts(term, selected.fit.of(k)));
         trace.say(&format_args!("{label}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2} arcsec"));
@@ -200,15 +201,16 @@ pub(crate) fn diagnose_extended(
     for something in &left {
         trace.say(&format_args!("left: {}, {:.2} arcsec", something.looks_like, something.size_arcsec));
     }
-    let fineness = Fineness { stride, noise, worth: problem.worth };
-    let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &problem.uncertain, stride));
-    let on_sample = sample.as_ref().map(|sample| sample.problem(noise, problem.worth));
-    let on_sample = on_sample.as_ref().zip(thinned.as_ref().map(|thinned| thinned.share));
-    let mut diagnosis =
-        verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, &hidden_lines, noise, settings, trace);
-    diagnosis.set_aside = prepare::too_few_left(&problem, diagnosis.finding);
+    let sample = search.thinned.as_ref();
+    let sample = sample.map(|thinned| (Sample::new(&on, thinned, &problem.uncertain, fineness.stride), thinned.share));
+    let on_sample = sample.as_ref().map(|(sample, share)| (sample.problem(*noise, *worth), *share));
+    let on_sample = on_sample.as_ref().map(|(sample, share)| (sample, *share));
+    let mut diagnosis = verdict::conclude(&search, &selected, on_sample, left, settings, trace);
+    diagnosis.set_aside = prepare::too_few_left(problem, diagnosis.finding);
+    drop(selected);
     let is_named = |cause: CauseName| diagnosis.causes.iter().any(|named| named.name == cause);
-    start.retain(|(law, _)| laws[*law].cause().is_none_or(is_named));
+    start.retain(|(law, _)| search.laws[*law].cause().is_none_or(is_named));
+    let Search { problem, laws, .. } = search;
     let extended = Extended::of(&problem, laws, &start, fineness).ok_or(DiagnosisError::NotFinite)?;
     Ok((diagnosis, extended))
 }
@@ -229,23 +231,19 @@ fn check(rows: &Rows) -> Result<(), DiagnosisError> {
 struct Search<'a> {
     laws: Vec<Law>,
     problem: Problem<'a>,
-    noise: Noise,
-    /// Rows to an average.
-    stride: usize,
     /// A sample of the rows, where they are many.
     thinned: Option<Thinned>,
     /// Index and places of each law chosen.
-    start: Vec<(usize, Vec<f64>)>,
+    start: Places,
     /// Where each law was at its best.
     bests: Bests,
     /// Lines too fast for averages, with their sizes, arcsec.
     fast: Vec<(Label, f64)>,
-    /// Every decision on the way.
-    trace: Trace,
 }
 
 impl<'a> Search<'a> {
-    fn new(on: &'a Excitation<'a>, settings: &Settings) -> Result<Search<'a>, DiagnosisError> {
+    /// Searches, with every decision on the way.
+    fn new(on: &'a Excitation<'a>, settings: &Settings) -> Result<(Search<'a>, Trace), DiagnosisError> {
         let mut laws = library(on);
         laws.extend(unnamed(on));
         laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.has(cause)));
@@ -258,14 +256,13 @@ impl<'a> Search<'a> {
         let mut hung = vec![false; on.rows.len()];
         let mut uncertain = prepare::uncertain(on, &[], &hung);
         let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
-        let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
         let mut averaged = Averaged::of(on, stride).map(Arc::new);
         let mut free = FreeColumns::of(on, &laws, averaged.clone());
         let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
         say_noise(&trace, noise, worth);
-        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+        let mut problem = Problem::new(on, &uncertain, Fineness { stride, noise, worth }, averaged.clone());
         let mut fast: Vec<(Label, f64)> = Vec::new();
-        let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
+        let mut start = Places::new();
         let mut bests = Bests::default();
         let mut thinned = Thinned::of(on, stride);
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
@@ -274,15 +271,10 @@ impl<'a> Search<'a> {
             let mut scope = Scope::Everything;
             if let Some(thinned) = &thinned {
                 let sample = Sample::new(on, thinned, &uncertain, stride);
-                let problem = sample.problem(noise, worth);
-                let terms = terms_at(&problem, &laws, &start);
-                let selected = choose(&problem, &laws, noise, terms, (&mut bests, scope, &mut trace))?;
-                start = remembered(&laws, &selected.terms);
+                choose(&sample.problem(noise, worth), &laws, &mut start, (&mut bests, scope, &mut trace))?;
                 scope = Scope::CameClose;
             }
-            let terms = terms_at(&problem, &laws, &start);
-            let selected = choose(&problem, &laws, noise, terms, (&mut bests, scope, &mut trace))?;
-            start = remembered(&laws, &selected.terms);
+            let selected = choose(&problem, &laws, &mut start, (&mut bests, scope, &mut trace))?;
             if round == MOST_ROUNDS {
                 break;
             }
@@ -342,23 +334,27 @@ impl<'a> Search<'a> {
             }
             (noise, worth) = (again, worth_again);
             say_noise(&trace, noise, worth);
-            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+            problem = Problem::new(on, &uncertain, Fineness { stride, noise, worth }, averaged.clone());
         }
-        Ok(Search { laws, problem, noise, stride, thinned, start, bests, fast, trace })
+        Ok((Search { laws, problem, thinned, start, bests, fast }, trace))
     }
 }
 
-/// Chooses causes among laws, beginning with some terms.
+/// Index and places of laws.
+type Places = Vec<(usize, Vec<f64>)>;
+
+/// Chooses causes among laws, beginning at `start`, which is then where those chosen are.
 fn choose<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],
-    noise: Noise,
-    start: Vec<Term<'l>>,
+    start: &mut Places,
     (bests, scope, trace): (&mut Bests, Scope, &mut Trace),
 ) -> Result<Selected<'l>, DiagnosisError> {
-    let least = select::least_size(noise.white);
+    let least = select::least_size(problem.noise.white);
     let chooser = Chooser { problem, laws, least, bests, scope, trace, given: HashSet::new() };
-    chooser.select(start).ok_or(DiagnosisError::NotFinite)
+    let selected = chooser.select(terms_at(problem, laws, start)).ok_or(DiagnosisError::NotFinite)?;
+    *start = remembered(laws, &selected.terms);
+    Ok(selected)
 }
 
 /// Says which noise was found, and the information weight of the rows under it.
@@ -369,7 +365,7 @@ fn say_noise(trace: &Trace, Noise { white, wander, correlation_s }: Noise, weigh
 }
 
 /// Which laws were selected, and where.
-fn remembered(laws: &[Law], terms: &[Term<'_>]) -> Vec<(usize, Vec<f64>)> {
+fn remembered(laws: &[Law], terms: &[Term<'_>]) -> Places {
     terms
         .iter()
         .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))

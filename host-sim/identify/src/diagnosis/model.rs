@@ -9,9 +9,10 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::Fineness;
 use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Coefficients, Excitation, Law, Regressor, Tag, Tolerance, left_by};
-use super::noise::Whitener;
+use super::noise::{Noise, Whitener};
 use super::products::{Products, Set};
 use super::rows::{combined, rms};
 use crate::linear::{Gram, Prior, Solution, products, solve};
@@ -34,6 +35,8 @@ pub(crate) struct Problem<'a> {
     pub base: Vec<Vec<f64>>,
     /// `base`, whitened.
     base_white: Set,
+    /// The noise of a row.
+    pub noise: Noise,
     /// Worth of the information, at most 1.
     pub worth: f64,
     /// What laws are evaluated on.
@@ -72,10 +75,11 @@ impl<'a> Problem<'a> {
     pub fn new(
         on: &'a Excitation<'a>,
         uncertain: &[bool],
-        whitener: Whitener,
-        worth: f64,
+        fineness: Fineness,
         averaged: Option<Arc<Averaged>>,
     ) -> Problem<'a> {
+        let Fineness { stride, noise, worth } = fineness;
+        let whitener = Whitener::new(on.rows, uncertain, stride, noise);
         let grain = Grain::new(averaged, &whitener);
         let rows: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
         let data = whitener.average(&rows);
@@ -85,19 +89,27 @@ impl<'a> Problem<'a> {
         let certain = whitener.certain(uncertain);
         let (uncertain, tried) = (uncertain.to_vec(), Mutex::default());
         let products = Products::over(whitener.blocks());
-        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, worth, grain, tried, products }
+        Problem {
+            on,
+            uncertain,
+            whitener,
+            certain,
+            data,
+            data_white,
+            base,
+            base_white,
+            noise,
+            worth,
+            grain,
+            tried,
+            products,
+        }
     }
 
     /// Blocks of averages that are left out one at a time.
     #[must_use]
     pub(crate) fn blocks(&self) -> &[Range<usize>] {
         &self.products.blocks
-    }
-
-    /// Products of base, terms, further columns and data.
-    #[must_use]
-    pub(crate) fn gram(&self, terms: &[&Term<'_>], further: Option<&Set>, block: Option<usize>) -> Gram {
-        self.products.gram(&self.sets(terms, further), block)
     }
 
     /// Sets of white columns of a model, the data last.
@@ -142,8 +154,12 @@ impl<'a> Problem<'a> {
     /// Root mean square over the averages without uncertain rows.
     #[must_use]
     pub(crate) fn certain_rms(&self, averaged: &[f64]) -> f64 {
-        let used: Vec<f64> = averaged.iter().zip(&self.certain).filter(|(_, c)| **c).map(|(v, _)| *v).collect();
-        rms(&used)
+        rms(&self.certain_of(averaged))
+    }
+
+    /// Values of the averages without uncertain rows.
+    pub(crate) fn certain_of(&self, averaged: &[f64]) -> Vec<f64> {
+        averaged.iter().zip(&self.certain).filter(|(_, certain)| **certain).map(|(value, _)| *value).collect()
     }
 }
 
@@ -410,6 +426,11 @@ pub(crate) fn terms_at<'l>(problem: &Problem<'_>, laws: &'l [Law], start: &[(usi
     among_each_other(problem, start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect())
 }
 
+/// All terms but the one at `k`.
+pub(super) fn but<T>(terms: &[T], k: usize) -> impl Iterator<Item = &T> {
+    terms.iter().enumerate().filter(move |(j, _)| *j != k).map(|(_, term)| term)
+}
+
 /// The terms evaluated anew, each on what the others leave to it.
 #[must_use]
 pub(crate) fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l>>) -> Vec<Term<'l>> {
@@ -419,8 +440,7 @@ pub(crate) fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l
         return terms;
     }
     for k in 0..terms.len() {
-        let others: Vec<&Term<'l>> = terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
-        let scaffold = Scaffold::new(problem, others).ahead(k);
+        let scaffold = Scaffold::new(problem, but(&terms, k)).ahead(k);
         let (left, occam) = (scaffold.left_to(terms[k].law), terms[k].occam);
         if left.is_some() || terms[k].among.is_some() {
             let term = Term::among(problem, terms[k].law, terms[k].places.clone(), left, Extent::Whole);
@@ -457,14 +477,6 @@ impl Fit {
         self.of(self.starts.len() - 1)
     }
 
-    /// These columns and priors fitted without a block of the data, whose products are `inside`.
-    #[must_use]
-    pub fn without(&self, inside: &Gram, worth: f64) -> Option<Solution> {
-        let mut outside = self.gram.clone();
-        outside.add(inside, -1.0);
-        solve(&outside, &self.priors, worth)
-    }
-
     /// Coefficients of the base.
     #[must_use]
     pub fn base(&self) -> &[f64] {
@@ -475,8 +487,9 @@ impl Fit {
 impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Products of the base and some terms.
     #[must_use]
-    pub fn new(problem: &'p Problem<'a>, terms: Vec<&'t Term<'l>>) -> Self {
-        let gram = problem.gram(&terms, None, None);
+    pub fn new(problem: &'p Problem<'a>, terms: impl IntoIterator<Item = &'t Term<'l>>) -> Self {
+        let terms: Vec<&Term<'l>> = terms.into_iter().collect();
+        let gram = problem.products.gram(&problem.sets(&terms, None), None);
         let ahead = terms.len();
         Scaffold { problem, terms, gram, ahead, left: Default::default() }
     }
@@ -486,6 +499,15 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     pub fn ahead(mut self, ahead: usize) -> Self {
         self.ahead = ahead;
         self
+    }
+
+    /// A fit of the terms, and of `further` columns, without a block of the data; and the products of that block.
+    #[must_use]
+    pub fn without_block(&self, fit: &Fit, further: Option<&Set>, block: usize) -> Option<(Solution, Gram)> {
+        let inside = self.problem.products.gram(&self.problem.sets(&self.terms, further), Some(block));
+        let mut outside = fit.gram.clone();
+        outside.add(&inside, -1.0);
+        Some((solve(&outside, &fit.priors, self.problem.worth)?, inside))
     }
 
     /// A law among the terms.
@@ -584,31 +606,21 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     #[must_use]
     pub fn begin(&self, law: &Law) -> Vec<Vec<f64>> {
         let mut places = self.begin_alone(law);
-        // Beside one that is there, another displacement may stand in any direction: together they are not what either
+        let Some([phase, size]) = law.displacement_at() else { return places };
+        // Next to one that is there, another displacement may stand in any direction: together they are not what either
         // is alone.
-        let met = self.terms.iter().find(|t| t.law.meets(law));
-        if let (Some(met), Some([phase, size])) = (met, law.displacement_at()) {
-            for k in 0..DIRECTIONS {
-                for smaller in SMALLER {
-                    let mut beside = law.places_like(met.law, &met.places);
-                    beside[phase] = k as f64 / DIRECTIONS as f64;
-                    beside[size] = (beside[size] - smaller).max(0.0);
-                    places.push(beside);
-                }
-            }
-        }
-        // Under a generator beside its axis it shows as another order than alone: no lead points there.
+        let met = self.terms.iter().find(|t| t.law.meets(law)).map(|t| (t, SMALLER));
+        // Under an eccentric generator it shows as another order than alone: no lead points there. Both are pressed in
+        // alike.
         let under = |t: &&&Term<'_>| t.law.is_in_zones() && t.law.acts_on(law) && !t.law.meets(law);
-        let lobes = self.terms.iter().find(under);
-        if let (Some(lobes), Some([phase, size])) = (lobes, law.displacement_at()) {
-            for k in 0..DIRECTIONS {
-                for arcsec in BESIDE_ARCSEC {
-                    // Both are pressed in alike.
-                    let mut beside = law.places_like(lobes.law, &lobes.places);
-                    beside[phase] = k as f64 / DIRECTIONS as f64;
-                    beside[size] = law.shapes[size].place(arcsec);
-                    places.push(beside);
-                }
+        let lobes =
+            self.terms.iter().find(under).map(|t| (t, BESIDE_ARCSEC.map(|arcsec| law.shapes[size].place(arcsec))));
+        for (is_met, (other, sizes)) in [(true, met), (false, lobes)].into_iter().filter_map(|(a, b)| Some((a, b?))) {
+            for (k, of) in (0..DIRECTIONS).flat_map(|k| sizes.map(|of| (k, of))) {
+                let mut beside = law.places_like(other.law, &other.places);
+                beside[phase] = k as f64 / DIRECTIONS as f64;
+                beside[size] = if is_met { (beside[size] - of).max(0.0) } else { of };
+                places.push(beside);
             }
         }
         places

@@ -309,7 +309,24 @@ impl FreeColumns {
         let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
         let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
         let grain = Grain::new(averaged, &plain);
-        let (columns, priors) = free_columns(on, laws, &plain, &grain).into_iter().unzip();
+        let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
+        let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
+            let tried = law.tried();
+            let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
+            let on = grain.excitation(law.smooth(), on);
+            let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
+            let counts =
+                |column: &Regressor| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
+            let wide = |column: Regressor| {
+                let averaged = grain.average(law.smooth(), &plain, &column.values);
+                let std = 20.0 / rms(&averaged).max(1e-9);
+                (averaged, Prior { mean: 0.0, std })
+            };
+            all.filter(counts).map(wide).collect()
+        };
+        let by_law: Vec<Vec<(Vec<f64>, Prior)>> = laws.par_iter().with_max_len(1).map(of_law).collect();
+        let all = on.base.floating.iter().map(floating).chain(by_law.into_iter().flatten());
+        let (columns, priors) = all.unzip();
         FreeColumns { stride, laws: laws.len(), columns, priors }
     }
 
@@ -347,7 +364,7 @@ pub fn noise(
         Some(judged) => thrown_out(&judged, uncertain),
         None => uncertain.to_vec(),
     };
-    let mut judged: Vec<Option<Judged>> = hypotheses.iter().map(|_| None).collect();
+    let mut judged: Vec<Option<Hypothesis>> = hypotheses.iter().map(|_| None).collect();
     // Some cannot be judged: each is asked once.
     let mut asked = vec![false; hypotheses.len()];
     let mut best = 0;
@@ -429,31 +446,8 @@ fn nearest(hypotheses: &[Noise], noise: Noise) -> usize {
     (1..hypotheses.len()).min_by(|a, b| apart(&hypotheses[*a]).total_cmp(&apart(&hypotheses[*b]))).unwrap_or(0)
 }
 
-/// Columns of what floats and of all laws at some places, averaged, with wide priors.
-fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Grain) -> Vec<(Vec<f64>, Prior)> {
-    let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
-    let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
-        let tried = law.tried();
-        let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
-        let on = grain.excitation(law.smooth(), on);
-        let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
-        let counts =
-            |column: &Regressor| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
-        all.filter(counts)
-            .map(|column| {
-                let averaged = grain.average(law.smooth(), plain, &column.values);
-                let std = 20.0 / rms(&averaged).max(1e-9);
-                (averaged, Prior { mean: 0.0, std })
-            })
-            .collect()
-    };
-    let mut columns: Vec<(Vec<f64>, Prior)> = on.base.floating.iter().map(floating).collect();
-    columns.extend(laws.par_iter().with_max_len(1).map(of_law).collect::<Vec<_>>().into_iter().flatten());
-    columns
-}
-
 /// How well a hypothesis of the noise tells what is left.
-struct Judged {
+struct Hypothesis {
     evidence: f64,
     innovations: Vec<f64>,
     whitener: Whitener,
@@ -461,19 +455,19 @@ struct Judged {
 
 impl FreeColumns {
     /// How well a hypothesis of the noise explains averaged data.
-    fn judge(&self, data: &[f64], whitener: Whitener) -> Option<Judged> {
+    fn judge(&self, data: &[f64], whitener: Whitener) -> Option<Hypothesis> {
         let mut all = whitener.whiten_each(&self.columns);
         all.push(whitener.whiten_averaged(data));
         let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
         let solution = solve(&Gram::of(&views, 0..data.len()), &self.priors, 1.0)?;
         let mut innovations = all.pop()?;
         all.iter().zip(&solution.coefficients).for_each(|(column, c)| add_scaled(&mut innovations, column, -c));
-        Some(Judged { evidence: solution.evidence - whitener.log_scale(), innovations, whitener })
+        Some(Hypothesis { evidence: solution.evidence - whitener.log_scale(), innovations, whitener })
     }
 }
 
 /// Rows that were uncertain, and those of averages whose innovations are no noise, if rare.
-fn thrown_out(judged: &Judged, uncertain: &[bool]) -> Vec<bool> {
+fn thrown_out(judged: &Hypothesis, uncertain: &[bool]) -> Vec<bool> {
     let spread = robust_std(judged.innovations.iter().copied());
     let beyond: Vec<f64> =
         judged.innovations.iter().map(|i| f64::from(u8::from(i.abs() > NO_NOISE * spread))).collect();

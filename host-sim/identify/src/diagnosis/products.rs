@@ -34,14 +34,8 @@ impl Deref for Set {
     }
 }
 
-/// Products of each column of a set with each of another.
-#[derive(Debug)]
-struct Met {
-    /// Over all rows, row by row of the products.
-    all: Vec<f64>,
-    /// Over each block.
-    blocks: Vec<Vec<f64>>,
-}
+/// Products of each column of a set with each of another, row by row: over all rows, then over each block.
+type Met = Vec<Vec<f64>>;
 
 /// Products that are kept at most: 256 MiB. *Guess*.
 const MOST_KEPT: usize = 32 << 20;
@@ -80,13 +74,13 @@ impl Products {
             }
             found
         };
-        let blocks: Vec<Vec<f64>> = self.blocks.iter().map(over).collect();
-        let mut all = vec![0.0; a.len() * b.len()];
-        for block in &blocks {
-            all.iter_mut().zip(block).for_each(|(sum, product)| *sum += product);
+        let mut met: Met = vec![vec![0.0; a.len() * b.len()]];
+        for block in self.blocks.iter().map(over) {
+            met[0].iter_mut().zip(&block).for_each(|(sum, product)| *sum += product);
+            met.push(block);
         }
-        let values = all.len() * (1 + blocks.len());
-        let met = Arc::new(Met { all, blocks });
+        let values = a.len() * b.len() * met.len();
+        let met = Arc::new(met);
         let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
         if kept.values + values > MOST_KEPT {
             *kept = MetPairs::default();
@@ -103,7 +97,7 @@ impl Products {
         let swapped = first.id > second.id;
         let (older, newer) = if swapped { (second, first) } else { (first, second) };
         let met = self.between(older, newer);
-        for (at, product) in block.map_or(&met.all, |k| &met.blocks[k]).iter().enumerate() {
+        for (at, product) in met[block.map_or(0, |k| k + 1)].iter().enumerate() {
             let (i, j) = (at / newer.len(), at % newer.len());
             if swapped { put(j, i, *product) } else { put(i, j, *product) }
         }

@@ -123,7 +123,7 @@ pub(crate) fn averaged_away(problem: &Problem<'_>, line: &SpectralLine) -> bool 
 #[must_use]
 pub(crate) fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], white: f64) -> Vec<Unexplained> {
     use rayon::prelude::*;
-    let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
+    let scaffold = Scaffold::new(problem, &selected.terms);
     let mut found: Vec<Unexplained> = maps
         .par_iter()
         .filter_map(|law| {

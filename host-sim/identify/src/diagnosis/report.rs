@@ -92,15 +92,18 @@ pub struct Cause {
     pub size_arcsec: f64,
     /// Causes that these data cannot tell from it, at most three.
     pub look_alikes: Vec<CauseName>,
+    /// What makes the same and is no cause of the library; it counts as one look-alike more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub look_alike_outside: Option<&'static str>,
 }
 
 impl Cause {
-    /// What the log itself may have that no data of it can tell from this cause.
-    #[must_use]
-    pub fn or_the_log(&self) -> Option<String> {
-        let ratio = self.parameters.get(ParameterName::StiffnessRatio.as_str()).map(|ratio| ratio.value)?;
-        (self.name == CauseName::StiffnessError)
-            .then(|| format!("a torque that is recorded {ratio:.2} times as large as it is"))
+    /// What is no cause of the library and cannot be told from this one by these data: it, or a wrong log.
+    pub fn outside_the_library(&self) -> impl Iterator<Item = String> {
+        let ratio = self.parameters.get(ParameterName::StiffnessRatio.as_str());
+        let ratio = ratio.filter(|_| self.name == CauseName::StiffnessError);
+        let torque = ratio.map(|ratio| format!("a torque that is recorded {:.2} times as large as it is", ratio.value));
+        self.look_alike_outside.map(str::to_owned).into_iter().chain(torque)
     }
 }
 
@@ -294,8 +297,8 @@ impl Diagnosis {
                 let [value, std] = p.digits();
                 let _ = writeln!(text, "    {name:<32} {value:>12} +- {std}");
             }
-            let alike = cause.look_alikes.iter().map(|alike| alike.as_str().to_owned()).chain(cause.or_the_log());
-            let alike: Vec<String> = alike.collect();
+            let alike = cause.look_alikes.iter().map(|alike| alike.as_str().to_owned());
+            let alike: Vec<String> = alike.chain(cause.outside_the_library()).collect();
             if !alike.is_empty() {
                 let _ = writeln!(text, "    cannot be told from: {}", alike.join(", "));
             }

@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::Search;
 use super::candidate::Law;
-use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
-use super::select::{Bests, Selected, begun, less, predicted, settle, size_of, sound};
+use super::model::{Problem, Scaffold, Term, among_each_other};
+use super::select::{Selected, begun, less, settle, size_of, sound};
 use super::thresholds::rivals::*;
 use super::trace::{Gate, Judged};
 use crate::causes::CauseName;
@@ -16,48 +17,43 @@ pub(crate) struct Rival<'l> {
     pub cause: CauseName,
     /// Rise of the misfit, in units in which 25 is five standard deviations.
     pub misfit: f64,
-    /// Difference of the predictions, rms arcsec.
-    pub apart_arcsec: f64,
+    /// Rise up to which the data cannot tell it from the cause.
+    least: f64,
+    /// Whether both predict the same.
+    same: bool,
     /// The law that it is, and where.
     law: &'l Law,
     places: Vec<f64>,
 }
 
 impl Rival<'_> {
-    /// Whether the data distinguish a cause of this size from it.
-    #[must_use]
-    pub(crate) fn judge(&self, size_arcsec: f64, out_of_tolerance: bool) -> Vec<Judged> {
-        let least = if out_of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART };
-        vec![Judged::number(Gate::ToldApart, self.misfit, least, !self.looks_alike(size_arcsec, out_of_tolerance))]
+    /// Whether the data cannot tell it from the cause.
+    pub(crate) fn alike(&self) -> bool {
+        self.misfit < self.least || self.same
     }
 
-    /// Whether it explains the data better in the place of a cause.
-    #[must_use]
-    pub(crate) fn in_its_place(&self) -> Vec<Judged> {
-        vec![Judged::number(Gate::AsRival, self.misfit, -TOLD_APART, self.misfit < -TOLD_APART)]
+    /// Whether the data distinguish the cause from it.
+    pub(crate) fn told_apart(&self) -> Judged {
+        Judged { passed: !self.alike(), ..Judged::above(Gate::ToldApart, self.misfit, self.least) }
     }
 
-    /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival
-    /// predicts the same, as the base takes its place: there the misfit alone decides, which has the tolerance in it.
-    #[must_use]
-    pub(crate) fn looks_alike(&self, size_arcsec: f64, out_of_tolerance: bool) -> bool {
-        let same = self.apart_arcsec < SAME_ARCSEC.max(SAME_SHARE * size_arcsec);
-        self.misfit < if out_of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART } || (same && !out_of_tolerance)
+    /// Whether it explains the data better in the place of the cause.
+    pub(crate) fn as_rival(&self) -> Judged {
+        Judged::below(Gate::AsRival, self.misfit, -TOLD_APART)
     }
 }
 
 /// A sample of the rows on which rivals are looked at first, and its share of all rows.
 pub(crate) type OnSample<'p, 'a> = Option<(&'p Problem<'a>, f64)>;
 
-/// Rivals of term `k`, closest first. With a sample only those that are near there are refitted to all rows.
+/// Rivals of term `k`, whose contribution is `size` arcsec rms, closest first. With a sample only those that are near
+/// there are refitted to all rows.
 #[must_use]
-pub(crate) fn rivals<'l>(
-    problem: &Problem<'_>,
+pub(super) fn rivals<'l>(
+    Search { problem, laws, bests, .. }: &'l Search<'_>,
     sample: OnSample<'_, '_>,
-    laws: &'l [Law],
     selected: &Selected<'_>,
-    bests: &Bests,
-    k: usize,
+    (k, size): (usize, f64),
 ) -> Vec<Rival<'l>> {
     let open: Vec<&Law> =
         laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
@@ -66,10 +62,10 @@ pub(crate) fn rivals<'l>(
         let terms = selected.terms.iter().map(|t| Term::new(sample, t.law, t.places.clone())).collect();
         let terms = among_each_other(sample, terms);
         let there = Selected::of(sample, terms)?;
-        Some((refitted(sample, &open, &there, begin, k), share))
+        Some((refitted(sample, &open, &there, begin, (k, size)), share))
     });
     let mut rivals: Vec<Rival<'l>> = match of_sample {
-        None => refitted(problem, &open, selected, begin, k),
+        None => refitted(problem, &open, selected, begin, (k, size)),
         Some((mut found, share)) => {
             found.iter_mut().for_each(|found| found.misfit /= share);
             let (near, far): (Vec<Rival<'l>>, Vec<Rival<'l>>) =
@@ -78,7 +74,7 @@ pub(crate) fn rivals<'l>(
             let from_there = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
                 near.iter().filter(|found| found.law.id() == law.id()).map(|found| found.places.clone()).collect()
             };
-            let near = refitted(problem, &near_laws, selected, from_there, k);
+            let near = refitted(problem, &near_laws, selected, from_there, (k, size));
             near.into_iter().chain(far).collect()
         }
     };
@@ -94,12 +90,12 @@ fn refitted<'l>(
     open: &[&'l Law],
     selected: &Selected<'_>,
     begin: impl Fn(&Scaffold<'_, '_, '_, '_>, &Law) -> Vec<Vec<f64>> + Sync,
-    k: usize,
+    (k, size): (usize, f64),
 ) -> Vec<Rival<'l>> {
-    let apart = selected.without(problem, k);
-    let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
-    let scaffold = Scaffold::new(problem, others.clone());
+    let Some(others) = selected.without(problem, k).map(|without| without.terms) else { return Vec::new() };
+    let scaffold = Scaffold::new(problem, &others);
     let now = selected.predicted(problem);
+    let of_tolerance = selected.terms[k].law.acts.tolerance_of.is_some();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
     let left = selected.fit.solution.misfit / (problem.worth * problem.data.len().max(1) as f64);
     open.par_iter()
@@ -122,24 +118,18 @@ fn refitted<'l>(
             if !sound(&term, fit.last()) {
                 return None;
             }
-            let rise = |fit: &Fit| (fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0);
-            let with: Vec<&Term<'_>> = others.iter().copied().chain([&term]).collect();
+            let rise = |of: &Selected<'_>| (of.fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0);
+            let places = term.places.clone();
+            let with = Selected { terms: [&others[..], &[term]].concat(), fit };
             // The others were refined beside the cause: beside a rival that is close they may be otherwise.
-            let near = (TOLD_APART..SETTLED_BELOW).contains(&rise(&fit));
-            let settled = near
-                .then(|| settle(problem, Selected { terms: with.iter().copied().cloned().collect(), fit: fit.clone() }))
-                .flatten();
-            let (misfit, then) = match &settled {
-                Some(settled) => (rise(&settled.fit), settled.predicted(problem)),
-                None => (rise(&fit), predicted(problem, &with, &fit)),
-            };
-            Some(Rival {
-                cause: law.cause()?,
-                misfit,
-                apart_arcsec: size_of(problem, &less(&now, &then)),
-                law,
-                places: term.places.clone(),
-            })
+            let near = (TOLD_APART..SETTLED_BELOW).contains(&rise(&with));
+            let settled = near.then(|| settle(problem, with.clone())).flatten().unwrap_or(with);
+            let apart = size_of(problem, &less(&now, &settled.predicted(problem)));
+            // A base parameter out of its tolerance takes the place of any rival: there all predict the same, and the
+            // misfit alone decides, which has the tolerance in it.
+            let same = !of_tolerance && apart < SAME_ARCSEC.max(SAME_SHARE * size);
+            let least = if of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART };
+            Some(Rival { cause: law.cause()?, misfit: rise(&settled), least, same, law, places })
         })
         .collect()
 }

@@ -2,17 +2,17 @@
 //! backward, then exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the
 //! other laws, sessions it was not fitted to.
 
-use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
 use super::candidate::{Coefficients, Law, Tag, Tolerance};
 use super::held_out::own_zero;
-use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
+use super::model::{Fit, Problem, Scaffold, Term, among_each_other, but};
 use super::thresholds::selection::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
+use crate::linear::Solution;
 
 /// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are exchanged.
 const MOST_ROUNDS: usize = 10;
@@ -45,7 +45,7 @@ impl<'l> Selected<'l> {
     /// These terms, fitted.
     #[must_use]
     pub fn of(problem: &Problem<'_>, terms: Vec<Term<'l>>) -> Option<Selected<'l>> {
-        let fit = Scaffold::new(problem, terms.iter().collect()).fit(None)?;
+        let fit = Scaffold::new(problem, &terms).fit(None)?;
         Some(Selected { terms, fit })
     }
 
@@ -67,24 +67,18 @@ impl<'l> Selected<'l> {
     /// Prediction beside the nominal one, averaged.
     #[must_use]
     pub fn predicted(&self, problem: &Problem<'_>) -> Vec<f64> {
-        predicted(problem, &self.terms.iter().collect::<Vec<_>>(), &self.fit)
+        predicted(problem, &self.terms, &self.fit)
     }
 
-    /// All terms but the one at `k`.
+    /// The selection without term `k`, the others as they are then, fitted.
     #[must_use]
-    pub fn others(&self, k: usize) -> Vec<&Term<'l>> {
-        self.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect()
-    }
-
-    /// The other terms, as they are where term `k` is not in the model.
-    #[must_use]
-    pub fn without<'s>(&'s self, problem: &Problem<'_>, k: usize) -> Vec<Cow<'s, Term<'l>>> {
-        let others = self.others(k);
-        if others.iter().any(|t| self.terms[k].law.acts_on(t.law)) {
-            let apart = among_each_other(problem, others.into_iter().cloned().collect());
-            return apart.into_iter().map(Cow::Owned).collect();
+    pub fn without(&self, problem: &Problem<'_>, k: usize) -> Option<Selected<'l>> {
+        let mut others = self.terms.clone();
+        let gone = others.remove(k);
+        if others.iter().any(|t| gone.law.acts_on(t.law)) {
+            others = among_each_other(problem, others);
         }
-        others.into_iter().map(Cow::Borrowed).collect()
+        Selected::of(problem, others)
     }
 }
 
@@ -135,7 +129,7 @@ fn sense(term: &Term<'_>, coefficients: &[f64]) -> [Judged; 2] {
     let physical = term.law.physical(&term.values(), term.by_role(coefficients));
     [
         Judged::plain(Gate::Sense, physical),
-        Judged::number(Gate::Deviations, nuisance / main, most, nuisance <= most * main),
+        Judged { passed: nuisance <= most * main, ..Judged::below(Gate::Deviations, nuisance / main, most) },
     ]
 }
 
@@ -215,11 +209,6 @@ impl Bests {
         known.truncate(NOTED);
     }
 
-    /// Whether a law came close.
-    fn is_close(&self, law: &Law) -> bool {
-        self.close.contains_key(&law.id())
-    }
-
     /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or
     /// before, and where its lead points now.
     pub fn begin(&self, scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law) -> Vec<Vec<f64>> {
@@ -235,45 +224,28 @@ impl Bests {
     }
 }
 
-/// What each law is worth beside the terms of a scaffold, not refined, at the places that `begin` gives.
+/// Evidence of each law together with the terms of a scaffold, not refined, at the places that `begin` gives.
 fn tried(
     scaffold: &Scaffold<'_, '_, '_, '_>,
     laws: &[&Law],
     begin: impl Fn(&Law) -> Vec<Vec<f64>> + Sync,
 ) -> Vec<Vec<(f64, Vec<f64>)>> {
-    let trials: Vec<(usize, Vec<f64>)> = laws
-        .par_iter()
-        .with_max_len(1)
-        .enumerate()
-        .flat_map_iter(|(k, law)| begin(law).into_iter().map(move |places| (k, places)))
-        .collect();
-    let tried: Vec<(usize, f64, Vec<f64>)> = trials
-        .into_par_iter()
-        .with_max_len(4)
-        .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places, laws[k].search.whole)?.evidence, places)))
-        .filter(|(_, evidence, _)| evidence.is_finite())
-        .collect();
-    let mut by_law: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); laws.len()];
-    for (k, evidence, places) in tried {
-        by_law[k].push((evidence, places));
-    }
-    by_law
+    let at = |law: &Law, places: Vec<f64>| {
+        let evidence = scaffold.trial(law, &places, law.search.whole)?.evidence;
+        evidence.is_finite().then_some((evidence, places))
+    };
+    let of = |law: &&Law| begin(law).into_par_iter().with_max_len(4).filter_map(|places| at(law, places)).collect();
+    laws.par_iter().with_max_len(1).map(of).collect()
 }
 
-/// Laws at the best of the places tried: those that are refined, best evidence first, and those that are not, with the
-/// gates that they came to.
-struct Screened<'l> {
-    terms: Vec<Term<'l>>,
-    refused: Vec<Dropped<'l>>,
-}
-
-/// The strongest laws (`most` of them) at the best of the places tried, law by law; not refined.
+/// The strongest laws (`most` of them) at the best of the places tried, best evidence first, not refined; and the others
+/// with the gates that they came to.
 fn best_tried<'l>(
     scaffold: &Scaffold<'_, '_, '_, 'l>,
     laws: &[&'l Law],
     tried: Vec<Vec<(f64, Vec<f64>)>>,
     most: usize,
-) -> Screened<'l> {
+) -> (Vec<Term<'l>>, Vec<Dropped<'l>>) {
     let begun: Vec<(&'l Law, Vec<f64>)> = laws
         .iter()
         .zip(tried)
@@ -295,7 +267,7 @@ fn best_tried<'l>(
     let mut counted = HashSet::new();
     let mut least = f64::INFINITY;
     for (evidence, law, places) in found {
-        let too_late = || vec![Judged::number(Gate::Refined, evidence, least, false)];
+        let too_late = || vec![Judged { passed: false, ..Judged::above(Gate::Refined, evidence, least) }];
         if counted.len() > most {
             refused.push((law, places, too_late()));
             continue;
@@ -322,7 +294,7 @@ fn best_tried<'l>(
         least = evidence;
         terms.push(term);
     }
-    Screened { terms, refused }
+    (terms, refused)
 }
 
 /// What each term adds that the others cannot, and what it is worth on sessions left out.
@@ -331,41 +303,37 @@ pub(crate) fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<S
     (0..selected.terms.len()).map(|k| standing(problem, selected, k)).collect()
 }
 
+/// What term `k` adds that the others cannot, and its gain on sessions left out.
 pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
-    let apart = selected.without(problem, k);
-    let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
-    let Some(without) = Scaffold::new(problem, others.clone()).fit(None) else {
+    let term = &selected.terms[k];
+    let Some(without) = selected.without(problem, k) else {
         return Standing { evidence: f64::INFINITY, size: f64::INFINITY, alone: f64::INFINITY, left_out: 1.0 };
     };
-    let with = selected.predicted(problem);
-    let lacking = predicted(problem, &others, &without);
-    let gain = selected.fit.solution.evidence + selected.terms[k].occam - without.solution.evidence;
-    let added = less(&with, &lacking);
-    let alone = size_of(problem, &added);
+    let evidence = selected.fit.solution.evidence + term.occam - without.fit.solution.evidence;
+    let alone = size_of(problem, &less(&selected.predicted(problem), &without.predicted(problem)));
     // At one load throughout, the zero of the encoder takes all of it.
-    let own = about_mean(problem, selected.terms[k].contribution(selected.fit.of(k)));
-    if selected.terms[k].law.acts.tolerance_of.is_some() {
+    let own = about_mean(problem, term.contribution(selected.fit.of(k)));
+    if term.law.acts.tolerance_of.is_some() {
         // Without it the base goes to its limit: what is beyond that is alone, all of it counts.
-        return Standing { evidence: gain, size: size_of(problem, &own), alone, left_out: 1.0 };
+        return Standing { evidence, size: size_of(problem, &own), alone, left_out: 1.0 };
     }
-    let mut left_out = left_out_gain(problem, &selected.terms.iter().collect::<Vec<_>>(), &others);
+    let mut left_out = left_out_gain(problem, &selected.terms, &without.terms);
     if left_out <= 0.0 {
         // Its deviations may not reach to other sessions, where the law itself does.
-        let bare = selected.terms[k].main_only(problem);
-        let with_bare: Vec<&Term<'_>> = others.iter().copied().chain([&bare]).collect();
-        left_out = left_out.max(left_out_gain(problem, &with_bare, &others));
+        let with_bare = [&without.terms[..], &[term.main_only(problem)]].concat();
+        left_out = left_out.max(left_out_gain(problem, &with_bare, &without.terms));
     }
     let mut size = (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone);
-    if selected.terms[k].law.acts.in_crossings {
+    if term.law.acts.in_crossings {
         size = size.max(super::rows::rms(&own).min(IN_CROSSINGS * size));
     }
-    Standing { evidence: gain, size, alone, left_out }
+    Standing { evidence, size, alone, left_out }
 }
 
 /// Less the mean: the zero of the encoder takes it.
 pub(super) fn about_mean(problem: &Problem<'_>, mut values: Vec<f64>) -> Vec<f64> {
-    let certain = || problem.certain.iter().filter(|c| **c).count().max(1) as f64;
-    let mean = values.iter().zip(&problem.certain).filter(|(_, c)| **c).map(|(v, _)| v).sum::<f64>() / certain();
+    let certain = problem.certain_of(&values);
+    let mean = certain.iter().sum::<f64>() / certain.len().max(1) as f64;
     values.iter_mut().for_each(|v| *v -= mean);
     values
 }
@@ -373,8 +341,8 @@ pub(super) fn about_mean(problem: &Problem<'_>, mut values: Vec<f64>) -> Vec<f64
 /// Size of an addition to the prediction.
 #[must_use]
 pub fn size_of(problem: &Problem<'_>, added: &[f64]) -> f64 {
-    let used: Vec<f64> = added.iter().zip(&problem.certain).filter(|(_, c)| **c).map(|(v, _)| v.abs()).collect();
-    let high = super::rows::quantile(used.iter().copied(), 0.97);
+    let used = problem.certain_of(added);
+    let high = super::rows::quantile(used.iter().map(|v| v.abs()), 0.97);
     super::rows::rms(&used).max(0.4 * high)
 }
 
@@ -383,28 +351,31 @@ pub(super) fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// Prediction beside the nominal one, averaged.
+/// Prediction in addition to the nominal one, averaged.
 #[must_use]
-pub fn predicted(problem: &Problem<'_>, terms: &[&Term<'_>], fit: &Fit) -> Vec<f64> {
-    let columns = problem.base.iter().chain(terms.iter().flat_map(|t| t.averaged.iter())).map(Vec::as_slice);
+pub fn predicted<'t, 'l: 't>(
+    problem: &Problem<'_>,
+    terms: impl IntoIterator<Item = &'t Term<'l>>,
+    fit: &Fit,
+) -> Vec<f64> {
+    let columns = terms.into_iter().flat_map(|term| term.averaged.iter());
+    let columns = problem.base.iter().chain(columns).map(Vec::as_slice);
     super::rows::combined(problem.data.len(), columns, &fit.solution.coefficients)
 }
 
 /// Gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
-fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
+fn left_out_gain(problem: &Problem<'_>, terms: &[Term<'_>], fewer: &[Term<'_>]) -> f64 {
     // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first
     // column is the zero.
     let own = own_zero(problem, terms);
-    let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
-        let fit = Scaffold::new(problem, terms.to_vec()).fit(None)?;
-        let mut all = 0.0;
-        for block in 0..problem.blocks().len() {
-            let inside = problem.gram(terms, None, Some(block));
-            let solution = fit.without(&inside, problem.worth)?;
-            let c = &solution.coefficients;
-            all += if own { inside.first_free().left_by(&c[1..]) } else { inside.left_by(c) };
-        }
-        Some(all)
+    let misfit = |terms: &[Term<'_>]| -> Option<f64> {
+        let scaffold = Scaffold::new(problem, terms);
+        let fit = scaffold.fit(None)?;
+        let of_block = |block| {
+            let (Solution { coefficients: c, .. }, inside) = scaffold.without_block(&fit, None, block)?;
+            Some(if own { inside.first_free().left_by(&c[1..]) } else { inside.left_by(&c) })
+        };
+        (0..problem.blocks().len()).map(of_block).sum()
     };
     match (misfit(terms), misfit(fewer)) {
         (Some(with), Some(without)) => (without - with) * problem.worth,
@@ -414,7 +385,7 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
 
 /// Whether a base parameter has left its tolerance far enough for `law` to be named; none for a law that is no base
 /// parameter.
-fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<Judged> {
+pub(super) fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<Judged> {
     let name = law.acts.tolerance_of?;
     let floating = &problem.on.base.floating;
     let Some(at) = floating.iter().position(|f| f.name == name) else {
@@ -424,9 +395,8 @@ fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<Judged> {
     let change = fit.solution.coefficients[at];
     let z = change / floating[at].spread;
     let physical = change >= -LARGEST_SHARE_LOST && law.physical(&[], Coefficients::new(&[Tag::SIZE], &[z]));
-    let out = physical && z.abs() > OUT_OF_TOLERANCE;
     // On the wrong side it counts as far below as it has gone there.
-    Some(Judged::number(Gate::Tolerance, if physical { z.abs() } else { -z.abs() }, OUT_OF_TOLERANCE, out))
+    Some(Judged::above(Gate::Tolerance, if physical { z.abs() } else { -z.abs() }, OUT_OF_TOLERANCE))
 }
 
 /// Least size of anything that counts, arcsec, at this white noise.
@@ -450,7 +420,7 @@ fn gates(law: &Law, standing: &Standing, least: f64, misfit: f64, strongest: f64
         Judged::above(Gate::Evidence, standing.evidence, evidence),
         size,
         Judged::above(Gate::Alone, standing.alone, share * misfit),
-        Judged::number(Gate::LeftOut, standing.left_out, 0.0, left_out),
+        Judged { passed: left_out, ..Judged::above(Gate::LeftOut, standing.left_out, 0.0) },
     ]
 }
 
@@ -477,9 +447,9 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -
                     && terms.iter().all(|t| t.law.label != law.label)
             })
             .collect();
-        let scaffold = Scaffold::new(problem, terms.iter().collect());
+        let scaffold = Scaffold::new(problem, &terms);
         let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
-        let found = best_tried(&scaffold, &open, tried, usize::MAX).terms;
+        let found = best_tried(&scaffold, &open, tried, usize::MAX).0;
         let best = found
             .into_par_iter()
             .with_max_len(1)
@@ -499,43 +469,26 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -
     terms
 }
 
-/// Refines each term with the others held.
+/// Refines each term with the others held, if there are others.
 pub(super) fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
-    if selected.terms.len() < 2 { Some(selected) } else { settle_all(problem, selected) }
+    if selected.terms.len() < 2 { Some(selected) } else { settle_each(problem, selected, false) }
 }
 
-/// Settles every term of a model with the others held, a single term too.
-pub(super) fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
-    settle_from(problem, selected, |_, term| vec![term.clone()])
-}
-
-/// Settles every term where one has gone that the others were refined with: those with a lead begin where it points
-/// now, too.
-fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
-    settle_from(problem, selected, |scaffold, term| {
-        let anew = if term.law.search.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
-        [term.clone()].into_iter().chain(anew.into_iter().map(|places| scaffold.term(term.law, places))).collect()
-    })
-}
-
-/// Refines each term with the others held, from the places that `beginnings` gives, and keeps the best.
-fn settle_from<'l>(
-    problem: &Problem<'_>,
-    mut selected: Selected<'l>,
-    beginnings: impl Fn(&Scaffold<'_, '_, '_, 'l>, &Term<'l>) -> Vec<Term<'l>>,
-) -> Option<Selected<'l>> {
-    selected.terms = among_each_other(problem, selected.terms);
-    for k in 0..selected.terms.len() {
-        if selected.terms[k].places.is_empty() {
-            continue;
-        }
-        let scaffold = Scaffold::new(problem, selected.others(k)).ahead(k);
-        let refined = beginnings(&scaffold, &selected.terms[k]).into_iter().filter_map(|term| scaffold.refine(term));
+/// Refines each term with the others held, a single term too. Where one has gone that they were refined with (`anew`),
+/// those with a lead begin where it points now, too, and the best is kept.
+pub(super) fn settle_each<'l>(problem: &Problem<'_>, selected: Selected<'l>, anew: bool) -> Option<Selected<'l>> {
+    let mut terms = among_each_other(problem, selected.terms);
+    for k in (0..terms.len()).filter(|k| !terms[*k].places.is_empty()).collect::<Vec<_>>() {
+        let scaffold = Scaffold::new(problem, but(&terms, k)).ahead(k);
+        let law = terms[k].law;
+        let begun = if anew && law.search.lead.is_some() { scaffold.begin(law) } else { Vec::new() };
+        let begun = begun.into_iter().map(|places| scaffold.term(law, places));
+        let refined = [terms[k].clone()].into_iter().chain(begun).filter_map(|term| scaffold.refine(term));
         if let Some((term, _)) = refined.max_by(|a, b| evidence_of(a).total_cmp(&evidence_of(b))) {
-            selected.terms[k] = term;
+            terms[k] = term;
         }
     }
-    Selected::of(problem, among_each_other(problem, selected.terms))
+    Selected::of(problem, among_each_other(problem, terms))
 }
 
 /// Evidence of a model of which this term came last, less what its freedom costs.
@@ -554,10 +507,7 @@ pub(super) fn earns(
     let law = selected.terms[k].law;
     let mut all = sense(&selected.terms[k], selected.fit.of(k)).to_vec();
     if law.acts.tolerance_of.is_some() {
-        let apart = selected.without(problem, k);
-        let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
-        let without = Scaffold::new(problem, others.clone()).fit(None);
-        let out = without.and_then(|fit| tolerance(problem, &fit, law));
+        let out = selected.without(problem, k).and_then(|without| tolerance(problem, &without.fit, law));
         all.push(out.unwrap_or(Judged::plain(Gate::Tolerance, false)));
     }
     let others = selected.terms.iter().zip(standings).enumerate().filter(|(j, _)| *j != k).map(|(_, other)| other);
@@ -597,7 +547,7 @@ impl<'l> Chooser<'_, '_, 'l> {
         let mut selected = Selected::of(problem, start)?;
         if !selected.terms.is_empty() {
             // They were found in other noise, and in rows that some of them have put in doubt since.
-            selected = self.backward(settle_all(problem, selected)?)?;
+            selected = self.backward(settle_each(problem, selected, false)?)?;
         }
         let mut seen = HashSet::new();
         for round in 0..MOST_ROUNDS {
@@ -626,12 +576,12 @@ impl<'l> Chooser<'_, '_, 'l> {
         let named = selected.terms.iter().filter(|t| t.law.named()).count();
         let unnamed = selected.terms.len() - named;
         let mut open: Vec<&Law> = Vec::new();
-        for law in self.laws.iter().filter(|law| everything || self.bests.is_close(law)) {
+        for law in self.laws.iter().filter(|law| everything || self.bests.close.contains_key(&law.id())) {
             if selected.terms.iter().any(|t| t.law.label == law.label) {
                 continue;
             }
             let (chosen, most) = if law.named() { (named, MOST_CAUSES) } else { (unnamed, MOST_UNNAMED) };
-            let room = Judged::number(Gate::Room, chosen as f64, most as f64, chosen < most);
+            let room = Judged::below(Gate::Room, chosen as f64, most as f64);
             let gates: Vec<Judged> = [room].into_iter().chain(tolerance(problem, &selected.fit, law)).collect();
             if passed(&gates) {
                 open.push(law);
@@ -639,7 +589,7 @@ impl<'l> Chooser<'_, '_, 'l> {
                 self.trace.judged(Stage::Tried, law, &[], None, gates);
             }
         }
-        let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
+        let scaffold = Scaffold::new(problem, &selected.terms);
         let (tried, most) = if everything {
             let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
             open.iter().zip(&tried).for_each(|(law, tried)| self.bests.note(law, tried));
@@ -647,7 +597,7 @@ impl<'l> Chooser<'_, '_, 'l> {
         } else {
             (tried(&scaffold, &open, |law| self.bests.begin_close(law)), REFINED_AGAIN)
         };
-        let Screened { terms: found, refused } = best_tried(&scaffold, &open, tried, most);
+        let (found, refused) = best_tried(&scaffold, &open, tried, most);
         for (law, places, gates) in refused {
             self.trace.judged(Stage::Tried, law, &places, None, gates);
         }
@@ -690,14 +640,9 @@ impl<'l> Chooser<'_, '_, 'l> {
         grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
         let standings = standings(problem, selected);
         let strongest = strongest(&selected.terms, &standings);
-        let mut grown = grown.into_iter();
-        while let Some((gain, next)) = grown.next() {
+        let mut grown = grown.into_iter().peekable();
+        while let Some((gain, next)) = grown.next_if(|(gain, _)| *gain >= LEAST_GAIN) {
             let term = next.newest();
-            if gain < LEAST_GAIN {
-                let short = Judged::number(Gate::Gain, gain, LEAST_GAIN, false);
-                self.trace.judged(Stage::Forward, term.law, &term.places, None, vec![short]);
-                break;
-            }
             let standing = standing(problem, &next, next.terms.len() - 1);
             let misfit = misfit_as(term.law, selected.terms.iter().zip(&standings));
             let gates = gates(term.law, &standing, self.least, misfit, strongest);
@@ -709,14 +654,14 @@ impl<'l> Chooser<'_, '_, 'l> {
                     if everything && less > gain - CLOSE_BEHIND {
                         self.bests.came_close(other);
                     }
-                    let behind = Judged::number(Gate::First, less, gain, false);
+                    let behind = Judged { passed: false, ..Judged::above(Gate::First, less, gain) };
                     self.trace.judged(Stage::Forward, other.law, &other.places, Some(term.law.label), vec![behind]);
                 }
                 return Some(next);
             }
         }
         for (gain, next) in grown {
-            let gates = vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, gain >= LEAST_GAIN)];
+            let gates = vec![Judged::above(Gate::Gain, gain, LEAST_GAIN)];
             self.trace.judged(Stage::Forward, next.newest().law, &next.newest().places, None, gates);
         }
         None
@@ -734,37 +679,9 @@ impl<'l> Chooser<'_, '_, 'l> {
             let Some((k, gates)) = weakest else { break };
             let gone = selected.terms.remove(k);
             self.trace.judged(Stage::Backward, gone.law, &gone.places, None, gates);
-            selected = settle_anew(problem, Selected::of(problem, selected.terms)?)?;
+            selected = settle_each(problem, Selected::of(problem, selected.terms)?, true)?;
         }
         Some(selected)
-    }
-
-    /// The strongest laws of `open` added to terms, refined, that make sense there.
-    fn refined_with(&self, others: &[Term<'l>], open: &[&'l Law]) -> Vec<(Term<'l>, Fit)> {
-        let bests = &*self.bests;
-        let scaffold = Scaffold::new(self.problem, others.iter().collect());
-        let tried = tried(&scaffold, open, |law| bests.begin(&scaffold, law));
-        let rivals = best_tried(&scaffold, open, tried, EXCHANGED).terms;
-        let refined = rivals.into_par_iter().with_max_len(1).filter_map(|term| scaffold.refine(term));
-        refined.filter(|(term, fit)| sound(term, fit.last())).collect()
-    }
-
-    /// The selection without term `k`, its fit, and the laws of `some` that may be tried in the place of the term.
-    fn in_place_of(
-        &self,
-        selected: &Selected<'l>,
-        k: usize,
-        some: impl Fn(&&'l Law) -> bool,
-    ) -> Option<(Selected<'l>, Vec<&'l Law>)> {
-        let held = selected.terms[k].law;
-        let others = selected.without(self.problem, k).into_iter().map(Cow::into_owned).collect();
-        let without = Selected::of(self.problem, others)?;
-        let may = |law: &&'l Law| {
-            tolerance(self.problem, &without.fit, law).is_none_or(|judged| judged.passed)
-                && !self.given.contains(&(held.id(), law.id()))
-        };
-        let open = self.laws.iter().filter(some).filter(may).collect();
-        Some((without, open))
     }
 
     /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what
@@ -773,9 +690,18 @@ impl<'l> Chooser<'_, '_, 'l> {
         let problem = self.problem;
         for k in (0..selected.terms.len()).filter(|k| *k != compared) {
             let held = &selected.terms[k];
-            let is_new = |law: &&'l Law| selected.terms.iter().all(|t| t.law.label != law.label);
-            let (without, open) = self.in_place_of(&selected, k, is_new)?;
-            let refined = self.refined_with(&without.terms, &open);
+            let without = selected.without(problem, k)?;
+            let may = |law: &&'l Law| {
+                selected.terms.iter().all(|t| t.law.label != law.label)
+                    && tolerance(problem, &without.fit, law).is_none_or(|judged| judged.passed)
+                    && !self.given.contains(&(held.law.id(), law.id()))
+            };
+            let open: Vec<&Law> = self.laws.iter().filter(may).collect();
+            let scaffold = Scaffold::new(problem, &without.terms);
+            let tried = tried(&scaffold, &open, |law| self.bests.begin(&scaffold, law));
+            let rivals = best_tried(&scaffold, &open, tried, EXCHANGED).0;
+            let refined = rivals.into_par_iter().with_max_len(1).filter_map(|term| scaffold.refine(term));
+            let refined: Vec<_> = refined.filter(|(term, fit)| sound(term, fit.last())).collect();
             let now = selected.predicted(problem);
             let size = size_of(problem, &less(&now, &without.predicted(problem)));
             let evidence = selected.fit.solution.evidence + held.occam;
@@ -784,7 +710,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             }
             let judge = |of: &(Term<'l>, Fit)| -> Vec<Judged> {
                 let (term, fit) = of;
-                let then = predicted(problem, &without.terms.iter().chain([term]).collect::<Vec<_>>(), fit);
+                let then = predicted(problem, without.terms.iter().chain([term]), fit);
                 let apart = size_of(problem, &less(&then, &now));
                 let gain = evidence - without.fit.solution.evidence;
                 let unnamed = || unnamed_ahead(Some(held.law).filter(|held| held.named()), gain);
@@ -794,8 +720,11 @@ impl<'l> Chooser<'_, '_, 'l> {
                 let ahead =
                     evidence_of(of) > evidence + needed && no_simpler || same(apart, size) && simpler(term, held);
                 vec![
-                    Judged::number(Gate::SamePlace, apart / size, IN_PLACE, apart < IN_PLACE * size),
-                    Judged::number(Gate::Ahead, evidence_of(of) - evidence, needed, ahead),
+                    Judged {
+                        passed: apart < IN_PLACE * size,
+                        ..Judged::below(Gate::SamePlace, apart / size, IN_PLACE)
+                    },
+                    Judged { passed: ahead, ..Judged::above(Gate::Ahead, evidence_of(of) - evidence, needed) },
                 ]
             };
             let mut contenders = Vec::new();
@@ -820,7 +749,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             let taken = passed(&gates);
             self.trace.judged(Stage::Exchange, law, &places, Some(held.law.label), gates);
             if taken {
-                let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
+                let gates = vec![Judged { passed: false, ..Judged::above(Gate::First, 0.0, ahead_by) }];
                 self.trace.judged(Stage::Exchange, held.law, &held.places, Some(law.label), gates);
                 self.given.insert((held.law.id(), law.id()));
                 return self.backward(exchanged);
@@ -838,9 +767,7 @@ fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [Grown<'l>], before
     named.sort_by(|a, b| b.0.total_cmp(&a.0));
     let least = named.first().map_or(f64::INFINITY, |(best, _)| (CONTENDS * best).max(LEAST_EVIDENCE));
     named.truncate(CONTENDERS);
-    named.retain(|(gain, next)| {
-        *gain >= least && next.others(next.terms.len() - 1).iter().any(|t| !t.places.is_empty())
-    });
+    named.retain(|(gain, next)| *gain >= least && but(&next.terms, next.terms.len() - 1).any(|t| !t.places.is_empty()));
     if named.len() < 2 {
         return;
     }

@@ -394,13 +394,13 @@ fn a_search_on_a_sample_comes_to_what_one_on_all_rows_comes_to() {
         [RUNOUT, "output_encoder_eccentricity:amplitude_arcsec=8,phase_rad=2", "sensor_latency:delay_s=0.002"];
     let sessions = recorded(&effects, 5, 6000, 100.0, 2.0, 31);
     excited_by(&sessions, &catalogue_drive(), |on| {
-        let search = super::Search::new(on, &Settings::default()).unwrap();
+        let (search, _) = super::Search::new(on, &Settings::default()).unwrap();
         assert!(search.thinned.as_ref().unwrap().share < 0.4);
-        let (problem, noise) = (&search.problem, search.noise);
+        let problem = &search.problem;
         let (mut bests, mut trace) = (super::Bests::default(), super::Trace::new(false));
         let everything = super::Scope::Everything;
         let on_all =
-            super::choose(problem, &search.laws, noise, Vec::new(), (&mut bests, everything, &mut trace)).unwrap();
+            super::choose(problem, &search.laws, &mut Vec::new(), (&mut bests, everything, &mut trace)).unwrap();
         let on_sample = super::terms_at(problem, &search.laws, &search.start);
         let on_sample = super::Selected::of(problem, on_sample).unwrap();
         let (all, sample) = (on_all.terms.len(), on_sample.terms.len());
@@ -490,8 +490,8 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
     };
     for (one, session) in series.iter().zip(&sessions).skip(1).step_by(2) {
         assert_eq!(one.extended_arcsec.len(), session.len());
-        let before = square(one.less_recalibrated(), &one.flank_uncertain);
-        let after = square(one.less_extended(), &one.flank_uncertain);
+        let before = square(one.less(&one.recalibrated_arcsec), &one.flank_uncertain);
+        let after = square(one.less(&one.extended_arcsec), &one.flank_uncertain);
         assert!(after < 0.2 * before, "{after} of {before}");
     }
     // On its own, a session is predicted as it was among the others: neither cause remembers sessions before.
@@ -1074,7 +1074,7 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
         errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / ARCSEC_PER_RAD);
     });
     excited_by(&sessions, &drive, |on| {
-        let search = super::Search::new(on, &Settings::default()).unwrap();
+        let (search, _) = super::Search::new(on, &Settings::default()).unwrap();
         let law = law(&search.laws, CauseName::CircularSplineEccentricity);
         let scaffold = super::model::Scaffold::new(&search.problem, Vec::new());
         let begun: Vec<Vec<f64>> = scaffold.begin(law).iter().map(|places| law.values(places)).collect();

@@ -5,11 +5,12 @@
 
 use std::sync::Arc;
 
+use super::Fineness;
 use super::averaged::Averaged;
 use super::base::{Base, Floating};
 use super::candidate::Excitation;
 use super::model::Problem;
-use super::noise::{Noise, Whitener};
+use super::noise::Noise;
 use super::rows::{Rows, parts};
 
 /// Rows of a sample, about. *Guess*: enough for three causes with some dozen columns.
@@ -87,8 +88,8 @@ impl<'a> Sample<'a> {
     /// The sample under this noise.
     #[must_use]
     pub fn problem(&self, noise: Noise, worth: f64) -> Problem<'_> {
-        let whitener = Whitener::new(self.on.rows, &self.uncertain, self.stride, noise);
-        Problem::new(&self.on, &self.uncertain, whitener, worth, self.averaged.clone())
+        let fineness = Fineness { stride: self.stride, noise, worth };
+        Problem::new(&self.on, &self.uncertain, fineness, self.averaged.clone())
     }
 }
 

@@ -9,7 +9,7 @@ use std::fmt;
 use std::io::Write as _;
 
 use serde::Serialize;
-use serde::ser::{SerializeMap, Serializer};
+use serde::ser::Serializer;
 
 use super::candidate::{Label, Law};
 use crate::causes::{CauseName, Need, ParameterName};
@@ -153,22 +153,6 @@ impl Gate {
             Gate::NoWorse => "predicts sessions left out, with the others named (arcsec rms)",
         }
     }
-
-    /// Whether a value passes below its limit, not above.
-    #[must_use]
-    pub const fn is_below(self) -> bool {
-        matches!(
-            self,
-            Gate::Deviations
-                | Gate::Room
-                | Gate::SamePlace
-                | Gate::LoadKnown
-                | Gate::NoLineBeside
-                | Gate::NoGrowthWithSpeed
-                | Gate::NoWorse
-                | Gate::AsRival
-        )
-    }
 }
 
 /// A gate with what came to it.
@@ -180,27 +164,29 @@ pub struct Judged {
     pub value: Option<f64>,
     /// The limit.
     pub limit: Option<f64>,
+    /// Whether the value has to be below the limit, not above.
+    pub is_below: bool,
     /// Whether it let it through.
     pub passed: bool,
 }
 
 impl Judged {
-    /// A number against a limit.
-    #[must_use]
-    pub fn number(gate: Gate, value: f64, limit: f64, passed: bool) -> Judged {
-        Judged { gate, value: Some(value), limit: Some(limit), passed }
-    }
-
     /// The value has to be above the limit.
     #[must_use]
     pub fn above(gate: Gate, value: f64, limit: f64) -> Judged {
-        Judged::number(gate, value, limit, value > limit)
+        Judged { gate, value: Some(value), limit: Some(limit), is_below: false, passed: value > limit }
+    }
+
+    /// The value has to be below the limit.
+    #[must_use]
+    pub fn below(gate: Gate, value: f64, limit: f64) -> Judged {
+        Judged { is_below: true, passed: value < limit, ..Judged::above(gate, value, limit) }
     }
 
     /// A value that is no number.
     #[must_use]
     pub fn plain(gate: Gate, passed: bool) -> Judged {
-        Judged { gate, value: None, limit: None, passed }
+        Judged { gate, value: None, limit: None, is_below: false, passed }
     }
 }
 
@@ -351,24 +337,17 @@ impl Trace {
 }
 
 /// One gate of a step, as it stands in `diagnosis.json`.
-struct Entry<'a>(&'a Step, &'a Judged);
-
-impl Serialize for Entry<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Entry(step, judged) = self;
-        let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("cause", &step.label.to_string())?;
-        map.serialize_entry("stage", &step.stage)?;
-        map.serialize_entry("round", &step.round)?;
-        map.serialize_entry("gate", &judged.gate)?;
-        map.serialize_entry("value", &judged.value.filter(|value| value.is_finite()))?;
-        map.serialize_entry("limit", &judged.limit.filter(|limit| limit.is_finite()))?;
-        map.serialize_entry("passed", &judged.passed)?;
-        if let Some(against) = step.against {
-            map.serialize_entry("against", &against.to_string())?;
-        }
-        map.end()
-    }
+#[derive(Serialize)]
+struct Entry {
+    cause: String,
+    stage: Stage,
+    round: usize,
+    gate: Gate,
+    value: Option<f64>,
+    limit: Option<f64>,
+    passed: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<String>,
 }
 
 /// Decisions as they stand in files: gate by gate.
@@ -376,8 +355,17 @@ pub(crate) struct Entries<'a>(pub Vec<&'a Step>);
 
 impl Serialize for Entries<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let gates = self.0.iter().flat_map(|step| step.gates.iter().map(|judged| Entry(step, judged)));
-        serializer.collect_seq(gates)
+        let entry = |step: &Step, judged: &Judged| Entry {
+            cause: step.label.to_string(),
+            stage: step.stage,
+            round: step.round,
+            gate: judged.gate,
+            value: judged.value.filter(|value| value.is_finite()),
+            limit: judged.limit.filter(|limit| limit.is_finite()),
+            passed: judged.passed,
+            against: step.against.map(|against| against.to_string()),
+        };
+        serializer.collect_seq(self.0.iter().flat_map(|step| step.gates.iter().map(move |judged| entry(step, judged))))
     }
 }
 

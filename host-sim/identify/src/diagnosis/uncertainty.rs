@@ -33,33 +33,19 @@ fn stretched(problem: &Problem<'_>, fit: &Fit, white: &[&[f64]]) -> Vec<f64> {
     let data = white[n];
     let explained = combined(data.len(), white[..n].iter().copied(), &fit.solution.coefficients);
     let left: Vec<f64> = data.iter().zip(explained).map(|(data, explained)| data - explained).collect();
-    let mut meat = vec![0.0; n * n];
+    let bread = fit.solution.covariance();
+    let mut sandwich = vec![0.0; n * n];
     for session in &problem.whitener.sessions {
         let len = session.len();
         for part in 0..STRETCHES {
             let block = session.start + len * part / STRETCHES..session.start + len * (part + 1) / STRETCHES;
             let score: Vec<f64> =
                 white[..n].iter().map(|c| problem.worth * dot(&c[block.clone()], &left[block.clone()])).collect();
-            for i in 0..n {
-                for j in 0..n {
-                    meat[i * n + j] += score[i] * score[j];
-                }
-            }
+            let moved: Vec<f64> = bread.chunks_exact(n).map(|row| dot(row, &score)).collect();
+            sandwich.iter_mut().zip(outer(&moved)).for_each(|(sum, product)| *sum += product);
         }
     }
-    let bread = fit.solution.covariance();
-    let times = |a: &[f64], b: &[f64]| -> Vec<f64> {
-        let mut product = vec![0.0; n * n];
-        for i in 0..n {
-            for k in 0..n {
-                for j in 0..n {
-                    product[i * n + j] += a[i * n + k] * b[k * n + j];
-                }
-            }
-        }
-        product
-    };
-    times(&times(&bread, &meat), &bread)
+    sandwich
 }
 
 /// How well a term is known.
@@ -176,13 +162,9 @@ fn by_noise(fit: &Fit, covariance: &[f64]) -> Vec<f64> {
     let n = fit.priors.len();
     let mut of_noise = covariance.to_vec();
     for (k, prior) in fit.priors.iter().enumerate() {
-        let column = &covariance[k * n..(k + 1) * n];
         let information = prior.std.powi(-2);
-        for (i, a) in column.iter().enumerate() {
-            for (j, b) in column.iter().enumerate() {
-                of_noise[i * n + j] -= information * a * b;
-            }
-        }
+        let products = outer(&covariance[k * n..(k + 1) * n]);
+        of_noise.iter_mut().zip(products).for_each(|(of_noise, product)| *of_noise -= information * product);
     }
     of_noise
 }
@@ -191,12 +173,12 @@ fn by_noise(fit: &Fit, covariance: &[f64]) -> Vec<f64> {
 #[must_use]
 pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec<Known> {
     let terms: Vec<&Term<'_>> = selected.terms.iter().collect();
-    let scaffold = Scaffold::new(problem, terms.clone());
+    let scaffold = Scaffold::new(problem, &selected.terms);
     let Some((fit, moves)) = scaffold.linearised() else { return vec![Known::default(); terms.len()] };
     let n = fit.priors.len();
     let left_out: Vec<(Vec<f64>, Vec<f64>)> = (0..problem.blocks().len())
         .filter_map(|block| {
-            let solved = fit.without(&problem.gram(&terms, Some(&moves), Some(block)), problem.worth)?;
+            let (solved, _) = scaffold.without_block(&fit, Some(&moves), block)?;
             let moved = solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect();
             Some((moved, solved.covariance()))
         })
@@ -260,20 +242,18 @@ fn parameters(
         let std = spread.covariances[0][j * dimension + j].max(0.0).sqrt();
         let step = (STEP * std).max(1e-9);
         let (mut c, mut p) = (coefficients.to_vec(), term.places.clone());
-        if j < c.len() {
-            c[j] += step;
-        } else {
-            let i = j - c.len();
-            p[i] += if term.law.shapes[i].cyclic || p[i] + step <= 1.0 { step } else { -step };
-        }
-        let sign = if j >= c.len() && p[j - c.len()] < term.places[j - c.len()] { -1.0 } else { 1.0 };
+        let by = match j.checked_sub(c.len()) {
+            Some(i) if !term.law.shapes[i].cyclic && p[i] + step > 1.0 => -step,
+            _ => step,
+        };
+        c.iter_mut().chain(&mut p).skip(j).take(1).for_each(|value| *value += by);
         for (slope, (new, old)) in slopes.iter_mut().zip(value(&c, &p).iter().zip(&at)) {
             let mut change = new.1 - old.1;
             if old.0.kind() == Kind::Angle {
                 change = (change + std::f64::consts::FRAC_PI_2).rem_euclid(std::f64::consts::PI)
                     - std::f64::consts::FRAC_PI_2;
             }
-            slope[j] = sign * change / step;
+            slope[j] = change / by;
         }
     }
     let (mut parameters, mut told): (_, Option<f64>) = (BTreeMap::new(), None);

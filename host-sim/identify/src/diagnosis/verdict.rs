@@ -5,57 +5,56 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::candidate::{Label, Law, Per, standing_pitch_error};
-use super::model::{Problem, Term};
+use super::model::{Problem, Term, but};
 use super::noise::Noise;
 use super::report::{
     Cause, Compensation, Diagnosis, Finding, HeldOut, Hint, Parameter, Residual, Unexplained, Verdict,
 };
 use super::select::{self, Selected, Standing, standings};
+use super::thresholds::selection::OUT_OF_TOLERANCE;
 use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
-use super::{Settings, experiment, held_out, remainder, rivals, with_speed};
+use super::{Search, Settings, experiment, held_out, remainder, rivals, with_speed};
 use crate::causes::{CauseName, ParameterName};
 use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// The verdict, with its causes and what is left.
-#[allow(clippy::too_many_arguments, reason = "all that a search has found")]
+/// The verdict over what a `search` has selected, with its causes and what is left over. Rivals are looked at on a
+/// sample of the rows first, where there is one.
 pub(super) fn conclude(
-    problem: &Problem<'_>,
+    search: &Search<'_>,
+    selected: &Selected<'_>,
     sample: rivals::OnSample<'_, '_>,
-    laws: &[Law],
-    selected: Selected<'_>,
-    bests: &select::Bests,
     mut left_over: Vec<Unexplained>,
-    hidden_lines: &[Label],
-    noise: Noise,
     settings: &Settings,
     mut trace: Trace,
 ) -> Diagnosis {
-    let standings = standings(problem, &selected);
+    let Search { problem, laws, .. } = search;
+    let noise = problem.noise;
+    let hidden_lines: Vec<Label> = search.fast.iter().map(|(label, _)| *label).collect();
+    let standings = standings(problem, selected);
     for (k, term) in selected.terms.iter().enumerate() {
-        let gates = select::earns(problem, &selected, &standings, k, select::least_size(noise.white));
+        let gates = select::earns(problem, selected, &standings, k, select::least_size(noise.white));
         trace.judged(Stage::Settled, term.law, &term.places, None, gates);
     }
-    let all: Vec<&Term<'_>> = selected.terms.iter().collect();
     // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or
     // without a cause.
-    let zeros = zeros_of_sessions(problem, &selected);
+    let zeros = zeros_of_sessions(problem, selected);
     let of_the_bench = |term: &Term<'_>| term.law.is_zero_of_sessions() && !zeros.is_empty();
     let given: Vec<Term<'_>> = selected.terms.iter().filter(|term| of_the_bench(term)).cloned().collect();
     let before = Selected::of(problem, given).map_or(Vec::new(), |given| remainder::left(problem, &given));
-    let after = remainder::left(problem, &selected);
+    let after = remainder::left(problem, selected);
     let floor = floor(problem, noise);
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
 
-    let known = known(problem, &selected, noise);
-    let unnamed = Unnamed::beside(&selected, &standings, &left_over, hidden_lines);
+    let known = known(problem, selected, noise);
+    let unnamed = Unnamed::beside(selected, &standings, &left_over, &hidden_lines);
     let left_of_noise = rms_after / floor.max(1e-30);
-    let named = understood(problem, &selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
-    let held = held_out::evaluate(problem, &all);
+    let named = understood(problem, selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
+    let held = held_out::evaluate(problem, &selected.terms);
     // What predicts sessions left out hardly better than the others do is a hint: it says nothing of the drive.
     let mut hints = Vec::new();
     let (named, too_little): (Vec<usize>, Vec<usize>) = named
@@ -70,7 +69,8 @@ pub(super) fn conclude(
     let only_hints = |k: usize| too_little.contains(&k) && held.gains_beside[k] >= 0.0;
     // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not
     // understood with nothing else found.
-    let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
+    let zeros_alone =
+        named.is_empty() && selected.terms.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
     let without_name = |k: usize| !named.contains(&k) && !only_hints(k) && !selected.terms[k].law.is_zero_of_sessions();
@@ -79,7 +79,7 @@ pub(super) fn conclude(
     // explanation.
     let (before_out, after_out) = (held.total.rms_before_arcsec, held.total.rms_after_arcsec);
     let most = NO_WORSE * before_out.min(compensation(problem, after_out).rms_uncompensated_arcsec);
-    let no_worse = Judged::number(Gate::NoWorse, after_out, most, after_out <= most);
+    let no_worse = Judged { passed: after_out <= most, ..Judged::below(Gate::NoWorse, after_out, most) };
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
@@ -96,19 +96,27 @@ pub(super) fn conclude(
         let of_all: Vec<Vec<rivals::Rival<'_>>> = named
             .par_iter()
             .with_max_len(1)
-            .map(|k| rivals::rivals(problem, sample, laws, &selected, bests, *k))
+            .map(|k| rivals::rivals(search, sample, selected, (*k, standings[*k].size)))
             .collect();
         for (k, rivals) in named.iter().copied().zip(of_all) {
             let Some(name) = selected.terms[k].law.cause() else { continue };
-            let size = standings[k].size;
-            let base = selected.terms[k].law.acts.tolerance_of.is_some();
             for rival in &rivals {
-                let against = |label: CauseName| Some(label.into());
-                trace.decided(Stage::Rival, name.into(), against(rival.cause), rival.judge(size, base));
-                trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place());
+                trace.decided(Stage::Rival, name.into(), Some(rival.cause.into()), vec![rival.told_apart()]);
+                trace.decided(Stage::Rival, rival.cause.into(), Some(name.into()), vec![rival.as_rival()]);
             }
-            let (alike, misfits): (Vec<CauseName>, Vec<f64>) =
-                rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| (r.cause, r.misfit)).take(3).unzip();
+            // A parameter of the nominal model that the fit holds at its limit takes the place of a cause of its own:
+            // what it leaves is not told from a cause of its kind.
+            let is_selected = |law: &Law| selected.terms.iter().any(|term| term.law.label == law.label);
+            let at_limit = |law: &&Law| {
+                let change = select::tolerance(problem, &selected.fit, law).and_then(|judged| judged.value);
+                selected.terms[k].law.wrong.kin.share(law.wrong.kin) == 1.0
+                    && change.is_some_and(|stds| stds.abs() > OUT_OF_TOLERANCE)
+                    && !is_selected(law)
+            };
+            let at_limit: Vec<CauseName> = laws.iter().filter(at_limit).filter_map(Law::cause).collect();
+            let others = rivals.iter().filter(|r| r.alike() && !at_limit.contains(&r.cause));
+            let all = at_limit.iter().map(|cause| (*cause, 0.0)).chain(others.map(|r| (r.cause, r.misfit)));
+            let (alike, misfits): (Vec<CauseName>, Vec<f64>) = all.take(3).unzip();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
                 let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
@@ -117,37 +125,25 @@ pub(super) fn conclude(
                         format!("{text}; expected to tell them apart by {apart:.0} standard deviations")
                     });
             }
+            let look_alike_outside = outside(k, name, &known[k], selected, problem);
             causes.push(Cause {
                 name,
-                confidence: confidence(
-                    &misfits,
-                    has_a_double_outside(k, name, &known[k], &selected, problem),
-                    closest,
-                    known[k].size_told,
-                ),
+                confidence: confidence(&misfits, look_alike_outside.is_some(), closest, known[k].size_told),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
                 size_arcsec: standings[k].size,
                 look_alikes: alike_with_wheel(name, alike, &known[k], problem.on.nominal),
+                look_alike_outside,
             });
         }
         causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
     }
     // Of a cause that was asked about and not named: what would tell it from the strongest that is.
-    let strongest_named = causes.first().and_then(|first: &Cause| {
-        selected
-            .terms
-            .iter()
-            .position(|term| term.law.is(first.name))
-            .filter(|_| causes.iter().all(|c| Some(c.name) != settings.asked))
-    });
-    let experiment_for_asked = settings.asked.zip(strongest_named).and_then(|(asked, k)| {
-        let laws: Vec<&Law> = laws.iter().filter(|law| law.is(asked)).take(1).collect();
-        if laws.is_empty() {
-            return None;
-        }
-        let (text, _) = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &laws, noise)?;
-        Some(text)
+    let not_named = |asked: &CauseName| causes.iter().all(|cause| cause.name != *asked);
+    let experiment_for_asked = settings.asked.filter(not_named).and_then(|asked| {
+        let k = selected.terms.iter().position(|term| causes.first().is_some_and(|first| term.law.is(first.name)))?;
+        let law = laws.iter().find(|law| law.is(asked))?;
+        Some(experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &[law], noise)?.0)
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
@@ -158,12 +154,9 @@ pub(super) fn conclude(
         let k = (0..known.len()).find(|k| selected.terms[*k].law.is(cause.name))?;
         waves_per_generator_turn(cause.name, &known[k], problem.on.nominal)
     };
-    if next_experiment.is_none() {
-        next_experiment = causes.iter().find_map(once_in_a_turn).map(experiment::turn_the_encoder);
-    }
-    if verdict != Verdict::None && next_experiment.is_none() {
-        next_experiment = Some(experiment::anyhow(problem.on, verdict == Verdict::Unknown));
-    }
+    let turned = || causes.iter().find_map(once_in_a_turn).map(experiment::turn_the_encoder);
+    let anyhow = || (verdict != Verdict::None).then(|| experiment::anyhow(problem.on, verdict == Verdict::Unknown));
+    let next_experiment = next_experiment.or_else(turned).or_else(anyhow);
     // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
     let mut held_out = held.total;
     if causes.is_empty() {
@@ -176,7 +169,7 @@ pub(super) fn conclude(
         .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
     unexplained_list.extend(left_over);
-    for (line, words) in with_speed::words(problem, &selected, &known, hidden_lines) {
+    for (line, words) in with_speed::words(problem, selected, &known, &hidden_lines) {
         unexplained_list.iter_mut().filter(|left| left.looks_like == line).for_each(|left| left.looks_like += &words);
     }
     Diagnosis {
@@ -197,7 +190,7 @@ pub(super) fn conclude(
         held_out,
         compensation: compensation(problem, held_out.rms_after_arcsec),
         unexplained: unexplained_list,
-        recalibrated: recalibrated(problem, &selected),
+        recalibrated: recalibrated(problem, selected),
         noise_arcsec: [noise.white, noise.wander],
         wander_correlation_s: noise.correlation_s,
         next_experiment,
@@ -329,12 +322,12 @@ fn understood(
         }
         if load_makes_it(selected.terms[k].law.cause(), problem) {
             let left = left_of_noise.hypot(unnamed.together / white);
-            gates.push(Judged::number(Gate::LoadKnown, left, NEAR_NOISE, left <= NEAR_NOISE));
+            gates.push(Judged::below(Gate::LoadKnown, left, NEAR_NOISE));
         }
         if let Some(frequency) = known[k].parameters.get(ParameterName::FrequencyHz.as_str()) {
             // What swings on at its own frequency, whatever the drive does, is driven by something else.
             let share = unnamed.swinging_near(frequency.value) / size;
-            gates.push(Judged::number(Gate::NoLineBeside, share, LARGE_BESIDE, share <= LARGE_BESIDE));
+            gates.push(Judged::below(Gate::NoLineBeside, share, LARGE_BESIDE));
         }
         gates.extend(growth_with_speed(problem, selected, &known[k], k));
         if passed(&gates) {
@@ -350,7 +343,7 @@ fn understood(
 fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
     let order = waves_per_generator_turn(selected.terms[k].law.cause()?, known, problem.on.nominal)?;
     let growth = with_speed::with_speed(problem, selected, Some(k), order)?.grows_by();
-    Some(Judged::number(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH, growth <= with_speed::NO_GROWTH))
+    Some(Judged::below(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH))
 }
 
 fn is_subdivision_of_output(cause: Option<CauseName>, known: &Known) -> bool {
@@ -376,28 +369,34 @@ fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
     if ratio > NOISE_KNOWN_TO { ratio } else { 1.0 }
 }
 
-/// Whether something that is no cause of the library, or none that could be held against it, makes the same: a wheel
-/// before the encoder, where its subdivision repeats in less than a turn; a load that nobody recorded; and once in a
-/// turn of the generator the motor's torque, a subdivision of its encoder, and the pitch of the wheel that stands.
-fn has_a_double_outside(
+/// What makes the same as a cause and is no cause of the library, or none that could be held against it, if there is
+/// something.
+fn outside(
     k: usize,
     name: CauseName,
     known: &Known,
     selected: &Selected<'_>,
     problem: &Problem<'_>,
-) -> bool {
+) -> Option<&'static str> {
     let nominal = problem.on.nominal;
     let standing = standing_pitch_error(nominal);
     let part_of_a_turn =
         is_subdivision_of_output(Some(name), known) && problem.on.output_span_rad() < std::f64::consts::TAU;
     let not_held_against_it = nominal.teeth.is_none()
         || name == CauseName::EncoderSubdivision
-        || selected.others(k).iter().any(|other| other.law.is(standing));
+        || but(&selected.terms, k).any(|other| other.law.is(standing));
     let line_of_generator = waves_per_generator_turn(name, known, nominal).is_some();
-    name.spec().double_outside
-        || part_of_a_turn
-        || load_makes_it(Some(name), problem)
-        || line_of_generator && (name == standing || not_held_against_it)
+    let reasons = [
+        (load_makes_it(Some(name), problem), "a load that was not recorded"),
+        (name.spec().double_outside, "a shaft before the encoder that is bent or not aligned"),
+        (part_of_a_turn, "a wheel before the encoder, which repeats within this part of a turn"),
+        (
+            line_of_generator && nominal.teeth.is_none(),
+            "the gear's own wheels, of which the teeth are not known, or the torque of the motor",
+        ),
+        (line_of_generator && (name == standing || not_held_against_it), "the torque of the motor"),
+    ];
+    reasons.into_iter().find(|(applies, _)| *applies).map(|(_, reason)| reason)
 }
 
 /// The look-alikes of a cause; of a subdivision of the generator's encoder the pitch error of the wheel that stands is

@@ -54,24 +54,26 @@ pub struct Part {
 /// The residual of each model and the contribution of each cause, from the predictions of the extended model for all
 /// sessions.
 pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diagnosis) -> (Vec<Level>, Vec<Part>) {
-    let joined = |of: &dyn Fn(&Series) -> Vec<f64>| series.iter().flat_map(of).collect::<Vec<f64>>();
-    let level = |id, name, residual_arcsec| Level { id, name, residual_arcsec };
+    let level = |id, name, predicted: fn(&Series) -> &[f64]| {
+        let residual_arcsec = series.iter().flat_map(|series| series.less(predicted(series))).collect();
+        Level { id, name, residual_arcsec }
+    };
     let mut levels = vec![
-        level("nominal", "nominal", joined(&Series::less_nominal)),
-        level("recalibrated", "recalibrated", joined(&Series::less_recalibrated)),
+        level("nominal", "nominal", |series| &series.nominal_arcsec),
+        level("recalibrated", "recalibrated", |series| &series.recalibrated_arcsec),
     ];
     // What was tried and not named is in no model that a reader is shown.
     if diagnosis.causes.is_empty() {
         return (levels, Vec::new());
     }
-    levels.push(level("extended", "with the causes", joined(&Series::less_extended)));
+    levels.push(level("extended", "with the causes", |series| &series.extended_arcsec));
     let parts = extended
         .causes()
         .iter()
         .enumerate()
         .map(|(k, cause)| Part {
             cause: cause.name(),
-            adds_arcsec: joined(&|s| s.cause_arcsec.get(k).cloned().unwrap_or_default()),
+            adds_arcsec: series.iter().flat_map(|s| s.cause_arcsec.get(k).cloned().unwrap_or_default()).collect(),
         })
         .collect();
     (levels, parts)
@@ -558,7 +560,7 @@ fn limited<T>(caption: &str, header: &[&str], items: &[T], row: impl Fn(&T) -> V
 
 /// The look-alikes of a cause, in words.
 fn alike(cause: &Cause) -> Vec<String> {
-    cause.look_alikes.iter().map(|name| name.words().to_owned()).chain(cause.or_the_log()).collect()
+    cause.look_alikes.iter().map(|name| name.words().to_owned()).chain(cause.outside_the_library()).collect()
 }
 
 /// A free parameter of the nominal model: the zero as an error, times in milliseconds, the rest as a share.
@@ -625,6 +627,7 @@ mod tests {
             held_out_gain: 0.8,
             size_arcsec: 12.0,
             look_alikes: vec![CauseName::SensorLatency],
+            look_alike_outside: None,
         };
         Diagnosis {
             schema_version: 1,

@@ -64,6 +64,7 @@ mod tests {
             held_out_gain: 0.5,
             size_arcsec: 5.0,
             look_alikes: Vec::new(),
+            look_alike_outside: None,
         };
         let nominal = catalogue_drive();
         let ring = cause(CauseName::CircularSplineOvality);

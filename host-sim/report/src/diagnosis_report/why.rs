@@ -26,7 +26,7 @@ pub(super) fn in_short(diagnosis: &Diagnosis) -> PageSection {
 /// Cause, whether it is named, what decided, found, asked for.
 fn decided(diagnosis: &Diagnosis, cause: CauseName) -> Vec<RichText> {
     let explanation = Explanation::of(diagnosis, cause);
-    let named = if explanation.named.is_some() { "yes" } else { "no" };
+    let named = if explanation.named { "yes" } else { "no" };
     let settled = || diagnosis.trace.of(cause).rev().find(|step| step.stage == Stage::Settled);
     let step = explanation.stopped.or_else(settled);
     let judged = step.and_then(Step::deciding);
@@ -44,10 +44,10 @@ fn decided(diagnosis: &Diagnosis, cause: CauseName) -> Vec<RichText> {
 /// The value found, and the limit.
 fn numbers(judged: Option<&Judged>) -> [RichText; 2] {
     let number = |value: f64| significant(value, 3).replace('-', "−");
-    match judged.map(|judged| (judged.gate, judged.value, judged.limit)) {
-        Some((gate, Some(value), Some(limit))) => {
-            let more = if gate.is_below() { "less than" } else { "more than" };
-            [RichText::new(number(value)), RichText::new(format!("{more} {}", number(limit)))]
+    match judged {
+        Some(Judged { value: Some(value), limit: Some(limit), is_below, .. }) => {
+            let more = if *is_below { "less than" } else { "more than" };
+            [RichText::new(number(*value)), RichText::new(format!("{more} {}", number(*limit)))]
         }
         _ => [RichText::new("–"), RichText::new("–")],
     }
