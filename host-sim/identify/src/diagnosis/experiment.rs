@@ -15,7 +15,7 @@ use super::rows::{Rows, add_scaled, quantile};
 use crate::measurement::Session;
 
 /// Generator turns, torque in units of the load scale, K above nominal, orientation.
-struct State {
+struct RunState {
     turns: f64,
     torque: f64,
     warmer: f64,
@@ -41,9 +41,9 @@ fn steps(share: f64) -> f64 {
 }
 
 /// Runs: what to do, and session by session how the drive is driven at a share (0 to 1) of its time.
-static MENU: [(&str, &[fn(f64) -> State]); 6] = {
-    const fn state(turns: f64, torque: f64, warmer: f64, orientation: f64) -> State {
-        State { turns, torque, warmer, orientation }
+static MENU: [(&str, &[fn(f64) -> RunState]); 6] = {
+    const fn state(turns: f64, torque: f64, warmer: f64, orientation: f64) -> RunState {
+        RunState { turns, torque, warmer, orientation }
     }
     [
         (
@@ -145,7 +145,7 @@ pub fn next(
     noise: Noise,
 ) -> Option<(String, f64)> {
     use rayon::prelude::*;
-    let apart = |(text, run): &(&'static str, &[fn(f64) -> State])| {
+    let apart = |(text, run): &(&'static str, &[fn(f64) -> RunState])| {
         (*text, least_apart(on, run, term, coefficients, alike, noise).unwrap_or(0.0))
     };
     let all: Vec<(&str, f64)> = MENU.par_iter().map(apart).collect();
@@ -156,7 +156,7 @@ pub fn next(
 /// Standard deviations by which the closest of `alike` misses what `term` would do on a run.
 fn least_apart(
     on: &Excitation<'_>,
-    run: &[fn(f64) -> State],
+    run: &[fn(f64) -> RunState],
     term: &Term<'_>,
     coefficients: &[f64],
     alike: &[&Law],
@@ -166,7 +166,7 @@ fn least_apart(
         .iter()
         .enumerate()
         .map(|(k, at)| {
-            let states: Vec<State> = (0..ROWS).map(|row| at(row as f64 / ROWS as f64)).collect();
+            let states: Vec<RunState> = (0..ROWS).map(|row| at(row as f64 / ROWS as f64)).collect();
             Session {
                 line: (0..ROWS as u64).collect(),
                 time_s: Some((0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect()),

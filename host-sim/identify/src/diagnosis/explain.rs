@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::report::Diagnosis;
-use super::trace::{Entries, Gate, Judged, Stage, Step};
+use super::trace::{Decision, Gate, Judged, Stage, TraceEntries};
 use crate::causes::CauseName;
 
 /// Why a cause was named, or was not.
@@ -27,10 +27,10 @@ pub struct Explanation<'a> {
     /// What to record, or to give, to learn more of it.
     record: Vec<String>,
     /// The decisions on it.
-    trace: Entries<'a>,
+    trace: TraceEntries<'a>,
     /// The decision against it; none for a cause that is named.
     #[serde(skip)]
-    pub stopped: Option<&'a Step>,
+    pub stopped: Option<&'a Decision>,
     /// Rise of the misfit with it in the place of each cause named.
     #[serde(skip)]
     in_place_of: Vec<(CauseName, f64)>,
@@ -44,7 +44,8 @@ impl<'a> Explanation<'a> {
         let named = diagnosis.causes.iter().find(|found| found.name == cause);
         let steps = trace.telling(cause);
         let last = |gates: &[Gate]| {
-            let of = |step: &&Step| step.gates.iter().find(|judged| gates.contains(&judged.gate)).and_then(|j| j.value);
+            let of =
+                |step: &&Decision| step.gates.iter().find(|judged| gates.contains(&judged.gate)).and_then(|j| j.value);
             steps.iter().rev().find_map(of)
         };
         let stopped = if named.is_some() { None } else { trace.stopped(cause) };
@@ -66,7 +67,7 @@ impl<'a> Explanation<'a> {
         if named.is_none() && record.is_empty() {
             record.extend(diagnosis.experiment_for_asked.clone());
         }
-        let as_rival = |step: &&Step| match step.gates[..] {
+        let as_rival = |step: &&Decision| match step.gates[..] {
             [Judged { gate: Gate::AsRival, value: Some(rise), .. }] => Some((step.against?.cause()?, rise)),
             _ => None,
         };
@@ -80,7 +81,7 @@ impl<'a> Explanation<'a> {
             None => not_named(stopped, &look_alikes),
         };
         let (evidence, size_arcsec) = (last(&[Gate::Evidence]), last(&[Gate::Size, Gate::SizeIfClear]));
-        let (named, trace) = (named.is_some(), Entries(steps));
+        let (named, trace) = (named.is_some(), TraceEntries(steps));
         Explanation {
             schema_version: 1,
             cause,
@@ -112,7 +113,7 @@ impl<'a> Explanation<'a> {
                 "in the place of {of} it {verb} the misfit by {rise:.0} (25 are five standard deviations)"
             );
         }
-        let Entries(steps) = &self.trace;
+        let TraceEntries(steps) = &self.trace;
         let told = steps.iter().filter(|step| step.stage != Stage::Data && !is_plain_rival(step));
         for (shown, step) in told.enumerate() {
             if shown == MOST_STEPS {
@@ -139,7 +140,7 @@ impl<'a> Explanation<'a> {
 const MOST_STEPS: usize = 6;
 
 /// A rival that neither tells better nor looks alike says nothing on a screen.
-fn is_plain_rival(step: &Step) -> bool {
+fn is_plain_rival(step: &Decision) -> bool {
     step.stage == Stage::Rival && (step.passed() || step.gates.iter().any(|judged| judged.gate == Gate::AsRival))
 }
 
@@ -157,7 +158,7 @@ fn number(value: f64) -> String {
 }
 
 /// Why a cause was not named: the decision against it, and the causes named that it is not told from.
-fn not_named(stopped: Option<&Step>, alike: &[CauseName]) -> String {
+fn not_named(stopped: Option<&Decision>, alike: &[CauseName]) -> String {
     let Some(step) = stopped else { return "It is not named: the search never came to it.".to_owned() };
     let Some(judged) = step.deciding() else { return "It is not named.".to_owned() };
     if let Gate::Needs(need) = judged.gate {

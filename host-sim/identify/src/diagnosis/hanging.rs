@@ -31,7 +31,7 @@ pub(crate) fn hanging(on: &Excitation<'_>, explained: &[f64], white: f64) -> Vec
     }
     let left = on.left(explained);
     for session in &rows.sessions {
-        for Event { rows: event, side } in may_hang(rows, session, &on.base.flank, on.nominal.friction_torque_n_m) {
+        for MayHang { rows: event, side } in may_hang(rows, session, &on.base.flank, on.nominal.friction_torque_n_m) {
             let short = |k: &usize| left[*k] * side > least;
             let Some(last) = event.clone().rev().find(short) else { continue };
             let over = event.start..last + 1;
@@ -46,15 +46,15 @@ pub(crate) fn hanging(on: &Excitation<'_>, explained: &[f64], white: f64) -> Vec
 
 /// Rows one after another in which the output may hang.
 #[derive(Debug, PartialEq)]
-struct Event {
+struct MayHang {
     rows: Range<usize>,
     /// Side on which the load carried before: its sign.
     side: f64,
 }
 
 /// Rows of a session in which a load of the other side has not been so large yet that it must have moved the output.
-fn may_hang(rows: &Rows, session: &Range<usize>, flank: &[f64], friction_n_m: f64) -> Vec<Event> {
-    let mut events: Vec<Event> = Vec::new();
+fn may_hang(rows: &Rows, session: &Range<usize>, flank: &[f64], friction_n_m: f64) -> Vec<MayHang> {
+    let mut events: Vec<MayHang> = Vec::new();
     // The side of the load that carried last, 0 if the output has left it, and since when the load is on another one.
     let mut side = rows.torque.get(session.start).map_or(0.0, |torque| torque.signum());
     let mut since: Option<f64> = None;
@@ -76,7 +76,7 @@ fn may_hang(rows: &Rows, session: &Range<usize>, flank: &[f64], friction_n_m: f6
         } else if side != 0.0 {
             match events.last_mut() {
                 Some(event) if event.rows.end == k && event.side == side => event.rows.end = k + 1,
-                _ => events.push(Event { rows: k..k + 1, side }),
+                _ => events.push(MayHang { rows: k..k + 1, side }),
             }
         }
     }
@@ -111,7 +111,7 @@ mod tests {
             let flank = PlayLaw::Held.flanks(&rows, &rows.torque, &nominal);
             may_hang(&rows, &rows.sessions[0], &flank, nominal.friction_torque_n_m)
         };
-        let event = |rows: Range<usize>, side: f64| Event { rows, side };
+        let event = |rows: Range<usize>, side: f64| MayHang { rows, side };
         assert_eq!(events(&[9.0, 1.5, -0.5, -1.5, -1.5, -2.5, -1.5], 0.01), [event(3..5, 1.0)]);
         // Back to the side that it never left.
         assert_eq!(events(&[9.0, -1.5, 1.5, 9.0, -9.0], 0.01), [event(1..2, 1.0)]);

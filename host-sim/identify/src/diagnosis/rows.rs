@@ -17,7 +17,7 @@ const FAR_APART: f64 = 4.0;
 
 /// Which columns were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Recorded {
+pub struct RecordedColumns {
     /// Time.
     pub time: bool,
     /// Torque.
@@ -36,7 +36,7 @@ pub struct Rows {
     /// Which sessions are learnt from. The others have a history (time, travel, temperature) all the same.
     pub used: Vec<bool>,
     /// What was recorded.
-    pub recorded: Recorded,
+    pub recorded: RecordedColumns,
     /// Time, s; row numbers where it was not recorded.
     pub time: Vec<f64>,
     /// Time since the session began, s.
@@ -83,7 +83,7 @@ impl Rows {
     pub fn new(sessions: &[Session], nominal: &Nominal) -> Rows {
         let mut rows = Rows::default();
         let all = |has: fn(&Session) -> bool| sessions.iter().all(has) && !sessions.is_empty();
-        rows.recorded = Recorded {
+        rows.recorded = RecordedColumns {
             time: all(|s| s.time_s.is_some()),
             torque: all(|s| s.torque_n_m.is_some()),
             temperature: all(|s| s.temperature_c.is_some()),

@@ -198,7 +198,7 @@ pub(crate) fn passed(gates: &[Judged]) -> bool {
 
 /// One judgement of one law.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Step {
+pub struct Decision {
     /// The law that was judged.
     pub label: Label,
     /// Its shape parameters.
@@ -213,7 +213,7 @@ pub struct Step {
     pub gates: Vec<Judged>,
 }
 
-impl Step {
+impl Decision {
     /// Whether all gates let it through.
     #[must_use]
     pub fn passed(&self) -> bool {
@@ -231,7 +231,7 @@ impl Step {
     }
 }
 
-impl fmt::Display for Step {
+impl fmt::Display for Decision {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {} {} {}", self.round, name_of(&self.stage), if self.passed() { '+' } else { '-' }, self.label)?;
         for (k, (name, value)) in self.shape.iter().enumerate() {
@@ -254,7 +254,7 @@ impl fmt::Display for Step {
 /// All decisions in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    steps: Vec<Step>,
+    steps: Vec<Decision>,
     round: usize,
     /// Says on stderr what comes.
     aloud: bool,
@@ -282,15 +282,15 @@ impl Trace {
         gates: Vec<Judged>,
     ) {
         let shape = law.shapes.iter().map(|shape| shape.name).zip(law.values(places)).collect();
-        self.push(Step { label: law.label, shape, stage, round: self.round, against, gates });
+        self.push(Decision { label: law.label, shape, stage, round: self.round, against, gates });
     }
 
     /// A decision on a cause that has no law here, or on what is named.
     pub(super) fn decided(&mut self, stage: Stage, label: Label, against: Option<Label>, gates: Vec<Judged>) {
-        self.push(Step { label, shape: Vec::new(), stage, round: self.round, against, gates });
+        self.push(Decision { label, shape: Vec::new(), stage, round: self.round, against, gates });
     }
 
-    fn push(&mut self, step: Step) {
+    fn push(&mut self, step: Decision) {
         self.say(&step);
         self.steps.push(step);
     }
@@ -303,20 +303,20 @@ impl Trace {
     }
 
     /// Decisions on a cause, in their order.
-    pub fn of(&self, cause: CauseName) -> impl DoubleEndedIterator<Item = &Step> {
+    pub fn of(&self, cause: CauseName) -> impl DoubleEndedIterator<Item = &Decision> {
         self.steps.iter().filter(move |step| step.label == Label::Cause(cause))
     }
 
     /// The decision that says why a cause was not named: of the last stage that it came to, the one of the law that
     /// came farthest. None if all gates let it through to the end.
     #[must_use]
-    pub fn stopped(&self, cause: CauseName) -> Option<&Step> {
-        let search = |step: &&Step| !matches!(step.stage, Stage::Exchange | Stage::Rival);
+    pub fn stopped(&self, cause: CauseName) -> Option<&Decision> {
+        let search = |step: &&Decision| !matches!(step.stage, Stage::Exchange | Stage::Rival);
         let last = self.of(cause).rev().find(search)?;
         if last.passed() {
             return None;
         }
-        let gained = |step: &Step| {
+        let gained = |step: &Decision| {
             [Gate::Evidence, Gate::Gain, Gate::First, Gate::Refined]
                 .into_iter()
                 .find_map(|gate| step.value_at(gate))
@@ -328,17 +328,18 @@ impl Trace {
 
     /// The decisions that say what became of a cause: those of the last round that it was judged in, and from any round
     /// those where it was chosen, given up, or held against a rival.
-    pub fn telling(&self, cause: CauseName) -> Vec<&Step> {
+    pub fn telling(&self, cause: CauseName) -> Vec<&Decision> {
         let last = self.of(cause).map(|step| step.round).max().unwrap_or(0);
-        let tells =
-            |step: &&Step| step.round == last || !matches!(step.stage, Stage::Tried | Stage::Forward) || step.passed();
+        let tells = |step: &&Decision| {
+            step.round == last || !matches!(step.stage, Stage::Tried | Stage::Forward) || step.passed()
+        };
         self.of(cause).filter(tells).collect()
     }
 }
 
 /// One gate of a step, as it stands in `diagnosis.json`.
 #[derive(Serialize)]
-struct Entry {
+struct TraceEntry {
     cause: String,
     stage: Stage,
     round: usize,
@@ -351,11 +352,11 @@ struct Entry {
 }
 
 /// Decisions as they stand in files: gate by gate.
-pub(crate) struct Entries<'a>(pub Vec<&'a Step>);
+pub(crate) struct TraceEntries<'a>(pub Vec<&'a Decision>);
 
-impl Serialize for Entries<'_> {
+impl Serialize for TraceEntries<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let entry = |step: &Step, judged: &Judged| Entry {
+        let entry = |step: &Decision, judged: &Judged| TraceEntry {
             cause: step.label.to_string(),
             stage: step.stage,
             round: step.round,
@@ -372,6 +373,6 @@ impl Serialize for Entries<'_> {
 impl Serialize for Trace {
     /// The deciding gates of each cause, cause after cause.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Entries(CauseName::ALL.iter().flat_map(|cause| self.telling(*cause)).collect()).serialize(serializer)
+        TraceEntries(CauseName::ALL.iter().flat_map(|cause| self.telling(*cause)).collect()).serialize(serializer)
     }
 }

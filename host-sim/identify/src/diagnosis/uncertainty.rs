@@ -85,7 +85,7 @@ const SIZES: [ParameterName; 13] = [
 const EXACTLY: f64 = 1e3;
 
 /// How far the coefficients and moves of one term may be off.
-struct Spread {
+struct TermCovariance {
     /// Covariance by Laplace's approximation, and by stretches of the data; row by row.
     covariances: [Vec<f64>; 2],
     /// What of Laplace's covariance noise makes; the rest is the spread between units and what laws may be wrong by.
@@ -94,7 +94,7 @@ struct Spread {
     shifts: Vec<(Vec<f64>, Vec<f64>)>,
 }
 
-impl Spread {
+impl TermCovariance {
     /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife.
     /// A jackknife holds for blocks that tell alike much; of others it counts only up to what Laplace's variance lacks.
     fn of(&self, form: &[f64]) -> f64 {
@@ -196,7 +196,7 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
         let block = |square: &[f64]| -> Vec<f64> {
             index.iter().flat_map(|i| index.iter().map(move |j| square[i * n + j])).collect()
         };
-        let spread = Spread {
+        let spread = TermCovariance {
             covariances: [block(&covariance), block(&by_stretches)],
             by_noise: block(&of_noise),
             shifts: left_out
@@ -231,7 +231,7 @@ fn parameters(
     problem: &Problem<'_>,
     term: &Term<'_>,
     coefficients: &[f64],
-    spread: &Spread,
+    spread: &TermCovariance,
     beyond: f64,
 ) -> (BTreeMap<&'static str, Parameter>, f64) {
     let value = |c: &[f64], places: &[f64]| term.law.parameters(problem.on, &term.law.values(places), term.by_role(c));
@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn what_is_left_beyond_noise_widens_what_noise_makes_and_not_what_units_differ_by() {
-        let spread = |noise: f64, units: f64| Spread {
+        let spread = |noise: f64, units: f64| TermCovariance {
             covariances: [vec![noise * noise + units * units], vec![0.0]],
             by_noise: vec![noise * noise],
             shifts: Vec::new(),
@@ -291,7 +291,8 @@ mod tests {
         assert!((widened(2.0, 0.0) - 36.0).abs() < 1e-12);
         assert!((widened(1.0, 2.0) - 13.0).abs() < 1e-12);
         // What stretches of the data tell of themselves has it in already.
-        let stretched = Spread { covariances: [vec![1.0], vec![25.0]], by_noise: vec![1.0], shifts: Vec::new() };
+        let stretched =
+            TermCovariance { covariances: [vec![1.0], vec![25.0]], by_noise: vec![1.0], shifts: Vec::new() };
         assert!((stretched.beyond_noise(&[1.0], 3.0) - 25.0).abs() < 1e-12);
     }
 

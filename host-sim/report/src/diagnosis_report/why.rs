@@ -6,7 +6,7 @@ use crate::page::{Detail, PageBlock, PageSection, RichText, significant};
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::report::Diagnosis;
-use flexspline_identify::diagnosis::trace::{Gate, Judged, Stage, Step};
+use flexspline_identify::diagnosis::trace::{Decision, Gate, Judged, Stage};
 
 /// The gate that decided for each cause.
 pub(super) fn in_short(diagnosis: &Diagnosis) -> PageSection {
@@ -29,7 +29,7 @@ fn decided(diagnosis: &Diagnosis, cause: CauseName) -> Vec<RichText> {
     let named = if explanation.named { "yes" } else { "no" };
     let settled = || diagnosis.trace.of(cause).rev().find(|step| step.stage == Stage::Settled);
     let step = explanation.stopped.or_else(settled);
-    let judged = step.and_then(Step::deciding);
+    let judged = step.and_then(Decision::deciding);
     let what = match judged {
         Some(Judged { gate: Gate::Needs(need), .. }) => need.missing().to_owned(),
         Some(judged) if judged.passed => "it passed every gate".to_owned(),
