@@ -220,7 +220,12 @@ fn faults_of_the_data_are_stamped_on_the_page_of_a_diagnosis() {
         "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad = \
          4.4e5\nbacklash_arcsec = 30.0\nfriction_torque_n_m = 1.0\n",
     );
-    desk.line("diagnose data.csv --model nominal.toml --out made").done();
+    let printed = desk.line("diagnose data.csv --model nominal.toml --out made").done().stdout;
+    // However many sessions there are: one line of all that were held out, and one of the worst.
+    let held_out: Vec<&str> = printed.lines().skip_while(|line| !line.contains("sessions held out")).skip(2).collect();
+    let [all, worst, wrote] = held_out[..] else { panic!("{printed}") };
+    assert!(all.starts_with("  all ") && worst.starts_with("  worst, "), "{printed}");
+    assert!(wrote.starts_with("wrote to "), "{printed}");
     let (html, json) = page(&desk, "made/report.html");
     let stamps: Vec<&str> = [&json["status"]]
         .into_iter()

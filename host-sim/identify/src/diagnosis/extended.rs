@@ -16,7 +16,7 @@ use super::report::Parameter;
 use super::resolution::averages_hide;
 use super::rows::{Rows, add_scaled};
 use super::select::{Selected, fixed, less, settle_each};
-use super::thinned::{Sample, Thinned};
+use super::thinned::{SampleToFit, Thinned};
 use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
 use crate::causes::{CauseName, ParameterName};
 use crate::measurement::Session;
@@ -185,7 +185,7 @@ impl Extended {
         nominal: &Nominal,
         table: Option<&Table<'_>>,
         causes: &[CauseName],
-        (settings, fineness): (&Settings, Fineness),
+        (settings, fineness): (&Settings<'_>, Fineness),
     ) -> Result<Extended, DiagnosisError> {
         let rows = Rows::new(sessions, nominal).learning_from(used);
         super::check(&rows)?;
@@ -201,7 +201,7 @@ impl Extended {
         let fineness = Fineness { stride, noise, worth };
         let problem = Problem::new(&on, &uncertain, fineness, Averaged::of(&on, stride).map(Arc::new));
         let thinned = Thinned::of(&on, stride);
-        let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &uncertain, stride));
+        let sample = thinned.as_ref().map(|thinned| SampleToFit::new(&on, thinned, &uncertain, stride));
         let on_sample = sample.as_ref().map(|sample| sample.problem(noise, worth));
         let mut start = super::remembered(&laws, &fixed(on_sample.as_ref().unwrap_or(&problem), &laws, causes));
         if on_sample.is_some() {

@@ -69,10 +69,10 @@ pub use pipeline::{
 };
 use prepare::FreeColumns;
 pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
-use resolution::{Resolution, resolution};
+use resolution::hidden_by_averages;
 use rows::Rows;
 use select::{Bests, Chooser, Scope, Selected};
-use thinned::{Sample, Thinned};
+use thinned::{SampleToFit, Thinned};
 pub(crate) use trace::{Gate, Judged, Stage, Trace};
 
 /// Why data cannot be diagnosed.
@@ -91,26 +91,9 @@ pub enum DiagnosisError {
     NotFinite,
 }
 
-/// Some of the causes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CauseSet(u64);
-
-impl CauseSet {
-    /// These.
-    pub fn of(causes: &[CauseName]) -> CauseSet {
-        const { assert!(CauseName::ALL.len() <= 64, "a bit for each cause") };
-        CauseSet(causes.iter().fold(0, |all, cause| all | 1 << *cause as u64))
-    }
-
-    /// Whether it is one of them.
-    pub fn has(self, cause: CauseName) -> bool {
-        self.0 >> cause as u64 & 1 == 1
-    }
-}
-
 /// Settings of a diagnosis.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct Settings<'a> {
     /// Radius of the pitch circle of the output, mm: turns arc-seconds into micrometres.
     pub pitch_radius_mm: f64,
     /// Averages of rows that fits are made on, about.
@@ -120,7 +103,7 @@ pub struct Settings {
     /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
     pub asked: Option<CauseName>,
     /// Causes that are not considered: somebody knows that they are not there, or wants to see what the rows say then.
-    pub without: CauseSet,
+    pub without: &'a [CauseName],
 }
 
 /// How finely rows are looked at, and the noise in them.
@@ -134,9 +117,9 @@ pub struct Fineness {
     pub worth: f64,
 }
 
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, without: CauseSet::default() }
+impl Default for Settings<'_> {
+    fn default() -> Self {
+        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, without: &[] }
     }
 }
 
@@ -157,7 +140,7 @@ pub fn diagnose(
     sessions: &[Session],
     nominal: &Nominal,
     table: Option<&Table<'_>>,
-    settings: &Settings,
+    settings: &Settings<'_>,
     progress: impl FnMut(usize, usize, &str),
 ) -> Result<Diagnosis, DiagnosisError> {
     diagnose_extended(sessions, nominal, table, settings, progress).map(|(diagnosis, _)| diagnosis)
@@ -171,7 +154,7 @@ pub(crate) fn diagnose_extended(
     sessions: &[Session],
     nominal: &Nominal,
     table: Option<&Table<'_>>,
-    settings: &Settings,
+    settings: &Settings<'_>,
     mut progress: impl FnMut(usize, usize, &str),
 ) -> Result<(Diagnosis, Extended), DiagnosisError> {
     let rows = Rows::new(sessions, nominal);
@@ -202,7 +185,8 @@ pub(crate) fn diagnose_extended(
         trace.say(&format_args!("left: {}, {:.2} arcsec", something.looks_like, something.size_arcsec));
     }
     let sample = search.thinned.as_ref();
-    let sample = sample.map(|thinned| (Sample::new(&on, thinned, &problem.uncertain, fineness.stride), thinned.share));
+    let sample =
+        sample.map(|thinned| (SampleToFit::new(&on, thinned, &problem.uncertain, fineness.stride), thinned.share));
     let on_sample = sample.as_ref().map(|(sample, share)| (sample.problem(*noise, *worth), *share));
     let on_sample = on_sample.as_ref().map(|(sample, share)| (sample, *share));
     let mut diagnosis = verdict::conclude(&search, &selected, on_sample, left, settings, trace);
@@ -243,10 +227,10 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Searches, with every decision on the way.
-    fn new(on: &'a Excitation<'a>, settings: &Settings) -> Result<(Search<'a>, Trace), DiagnosisError> {
+    fn new(on: &'a Excitation<'a>, settings: &Settings<'_>) -> Result<(Search<'a>, Trace), DiagnosisError> {
         let mut laws = library(on);
         laws.extend(unnamed(on));
-        laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.has(cause)));
+        laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.contains(&cause)));
         let mut trace = Trace::new(settings.verbose);
         for cause in CauseName::ALL {
             if let Some(need) = on.lacks(*cause) {
@@ -255,10 +239,13 @@ impl<'a> Search<'a> {
         }
         let mut hung = vec![false; on.rows.len()];
         let mut uncertain = prepare::uncertain(on, &[], &hung);
-        let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
+        // Rows to an average that leave about as many averages as asked for, unless they hide something.
+        let usual = (on.rows.count_used() / settings.averages).max(1);
+        let at_first = hidden_by_averages(on, &laws, &uncertain, usual, &[]);
+        let mut stride = if at_first.is_some() { 1 } else { usual };
         let mut averaged = Averaged::of(on, stride).map(Arc::new);
         let mut free = FreeColumns::of(on, &laws, averaged.clone());
-        let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
+        let (mut noise, mut worth) = prepare::noise(on, &free, at_first.as_deref().unwrap_or(&[]), &uncertain, None);
         say_noise(&trace, noise, worth);
         let mut problem = Problem::new(on, &uncertain, Fineness { stride, noise, worth }, averaged.clone());
         let mut fast: Vec<(Label, f64)> = Vec::new();
@@ -270,7 +257,7 @@ impl<'a> Search<'a> {
             fast.clear();
             let mut scope = Scope::Everything;
             if let Some(thinned) = &thinned {
-                let sample = Sample::new(on, thinned, &uncertain, stride);
+                let sample = SampleToFit::new(on, thinned, &uncertain, stride);
                 choose(&sample.problem(noise, worth), &laws, &mut start, (&mut bests, scope, &mut trace))?;
                 scope = Scope::CameClose;
             }
@@ -310,17 +297,17 @@ impl<'a> Search<'a> {
             let other_rows = changed > on.rows.len() / 200 || hangs;
             uncertain = doubtful;
             // What was large may have hidden what is fast.
-            let finer = resolution(on, &laws, &uncertain, settings.averages, &explained);
-            let closer_look = finer.stride < stride;
-            stride = stride.min(finer.stride);
+            let hidden = hidden_by_averages(on, &laws, &uncertain, usual, &explained);
+            let closer_look = hidden.is_some() && stride > 1;
             if closer_look {
+                stride = 1;
                 averaged = Averaged::of(on, stride).map(Arc::new);
                 thinned = Thinned::of(on, stride);
             }
             if closer_look || !free.are_of(&laws) {
                 free = FreeColumns::of(on, &laws, averaged.clone());
             }
-            explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
+            explained.iter_mut().zip(hidden.iter().flatten()).for_each(|(sum, fast)| *sum += fast);
             let (again, worth_again) = {
                 let explained: &[f64] = if new_line { &[] } else { &explained };
                 prepare::noise(on, &free, explained, &uncertain, Some(noise))

@@ -19,7 +19,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::report::{Cause, Diagnosis};
-use super::{CauseSet, DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
+use super::{DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
 use super::{channels, quieted, torque_zero, zeros};
 use crate::calibrate::{CalibrationError, Prior, check_ratio_of, table_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
@@ -353,7 +353,7 @@ pub fn diagnose_rows(
     let settings = Settings {
         verbose: options.verbose,
         asked: options.asked,
-        without: CauseSet::of(options.without),
+        without: options.without,
         pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(),
         ..Settings::default()
     };

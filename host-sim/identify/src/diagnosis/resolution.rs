@@ -18,41 +18,26 @@ const LEAST_EVIDENCE: f64 = 10.0;
 /// million.
 const OUTLIER: f64 = 5.0;
 
-/// How finely the rows are looked at.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Resolution {
-    /// Rows to an average.
-    pub stride: usize,
-    /// What fast laws explain, row by row, arcsec; empty if none showed.
-    pub fast: Vec<f64>,
-}
-
-/// Rows to an average that leave about `averages` of them, or every row where averaging would hide a law that the data
-/// hold. Rows marked uncertain are not looked at; `explained` is what is explained already, row by row, arcsec (nothing
-/// if it is empty).
+/// What laws explain, row by row, arcsec, that averages of `stride` rows would hide and the data hold: then every row is
+/// needed. Rows marked uncertain are not looked at; `explained` is what is explained already, row by row, arcsec
+/// (nothing if it is empty).
 #[must_use]
-pub(crate) fn resolution(
+pub(crate) fn hidden_by_averages(
     on: &Excitation<'_>,
     laws: &[Law],
     uncertain: &[bool],
-    averages: usize,
+    stride: usize,
     explained: &[f64],
-) -> Resolution {
-    let left = on.left(explained);
-    let stride = (on.rows.count_used() / averages).max(1);
+) -> Option<Vec<f64>> {
     if stride == 1 {
-        return Resolution { stride, fast: Vec::new() };
+        return None;
     }
+    let left = on.left(explained);
     let averages = averages_of(on, uncertain, stride);
-    let shown = laws
-        .iter()
+    laws.iter()
         .filter(|law| law.named() && law.shapes.is_empty())
         .filter_map(|law| hidden(on, law, &averages))
-        .find_map(|main| explained_in_detail(on.rows, &main, &left, uncertain));
-    match shown {
-        Some(fast) => Resolution { stride: 1, fast },
-        None => Resolution { stride, fast: Vec::new() },
-    }
+        .find_map(|main| explained_in_detail(on.rows, &main, &left, uncertain))
 }
 
 /// Whether averages of `stride` rows hide any of these causes.

@@ -12,7 +12,7 @@ use crate::causes::CauseName;
 
 /// A rival in the place of a cause.
 #[derive(Clone)]
-pub(crate) struct Rival<'l> {
+pub(crate) struct RefittedCause<'l> {
     /// Its name.
     pub cause: CauseName,
     /// Rise of the misfit, in units in which 25 is five standard deviations.
@@ -26,7 +26,7 @@ pub(crate) struct Rival<'l> {
     places: Vec<f64>,
 }
 
-impl Rival<'_> {
+impl RefittedCause<'_> {
     /// Whether the data cannot tell it from the cause.
     pub(crate) fn alike(&self) -> bool {
         self.misfit < self.least || self.same
@@ -54,7 +54,7 @@ pub(super) fn rivals<'l>(
     sample: OnSample<'_, '_>,
     selected: &Selected<'_>,
     (k, size): (usize, f64),
-) -> Vec<Rival<'l>> {
+) -> Vec<RefittedCause<'l>> {
     let open: Vec<&Law> =
         laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
     let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
@@ -64,11 +64,11 @@ pub(super) fn rivals<'l>(
         let there = Selected::of(sample, terms)?;
         Some((refitted(sample, &open, &there, begin, (k, size)), share))
     });
-    let mut rivals: Vec<Rival<'l>> = match of_sample {
+    let mut rivals: Vec<RefittedCause<'l>> = match of_sample {
         None => refitted(problem, &open, selected, begin, (k, size)),
         Some((mut found, share)) => {
             found.iter_mut().for_each(|found| found.misfit /= share);
-            let (near, far): (Vec<Rival<'l>>, Vec<Rival<'l>>) =
+            let (near, far): (Vec<RefittedCause<'l>>, Vec<RefittedCause<'l>>) =
                 found.into_iter().partition(|found| found.misfit < NEAR);
             let near_laws: Vec<&Law> = near.iter().map(|found| found.law).collect();
             let from_there = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
@@ -91,7 +91,7 @@ fn refitted<'l>(
     selected: &Selected<'_>,
     begin: impl Fn(&Scaffold<'_, '_, '_, '_>, &Law) -> Vec<Vec<f64>> + Sync,
     (k, size): (usize, f64),
-) -> Vec<Rival<'l>> {
+) -> Vec<RefittedCause<'l>> {
     let Some(others) = selected.without(problem, k).map(|without| without.terms) else { return Vec::new() };
     let scaffold = Scaffold::new(problem, &others);
     let now = selected.predicted(problem);
@@ -129,7 +129,7 @@ fn refitted<'l>(
             // misfit alone decides, which has the tolerance in it.
             let same = !of_tolerance && apart < SAME_ARCSEC.max(SAME_SHARE * size);
             let least = if of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART };
-            Some(Rival { cause: law.cause()?, misfit: rise(&settled), least, same, law, places })
+            Some(RefittedCause { cause: law.cause()?, misfit: rise(&settled), least, same, law, places })
         })
         .collect()
 }

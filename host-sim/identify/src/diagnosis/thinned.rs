@@ -69,20 +69,20 @@ impl Thinned {
 }
 
 /// The sample as models are fitted to it.
-pub(crate) struct Sample<'a> {
+pub(crate) struct SampleToFit<'a> {
     on: Excitation<'a>,
     uncertain: Vec<bool>,
     stride: usize,
     averaged: Option<Arc<Averaged>>,
 }
 
-impl<'a> Sample<'a> {
+impl<'a> SampleToFit<'a> {
     /// The sample where these of all rows are uncertain, averaged as it was made for.
     #[must_use]
-    pub fn new(on: &Excitation<'a>, thinned: &'a Thinned, uncertain: &[bool], stride: usize) -> Sample<'a> {
+    pub fn new(on: &Excitation<'a>, thinned: &'a Thinned, uncertain: &[bool], stride: usize) -> SampleToFit<'a> {
         let on = on.over(&thinned.rows, &thinned.base);
         let averaged = Averaged::of(&on, stride).map(Arc::new);
-        Sample { on, uncertain: thinned.kept.iter().map(|k| uncertain[*k]).collect(), stride, averaged }
+        SampleToFit { on, uncertain: thinned.kept.iter().map(|k| uncertain[*k]).collect(), stride, averaged }
     }
 
     /// The sample under this noise.

@@ -27,7 +27,7 @@ pub(super) fn conclude(
     selected: &Selected<'_>,
     sample: rivals::OnSample<'_, '_>,
     mut left_over: Vec<Unexplained>,
-    settings: &Settings,
+    settings: &Settings<'_>,
     mut trace: Trace,
 ) -> Diagnosis {
     let Search { problem, laws, .. } = search;
@@ -93,7 +93,7 @@ pub(super) fn conclude(
     let mut causes = Vec::new();
     let mut next_experiment = None;
     if verdict != Verdict::Unknown {
-        let of_all: Vec<Vec<rivals::Rival<'_>>> = named
+        let of_all: Vec<Vec<rivals::RefittedCause<'_>>> = named
             .par_iter()
             .with_max_len(1)
             .map(|k| rivals::rivals(search, sample, selected, (*k, standings[*k].size)))
@@ -104,16 +104,7 @@ pub(super) fn conclude(
                 trace.decided(Stage::Rival, name.into(), Some(rival.cause.into()), vec![rival.told_apart()]);
                 trace.decided(Stage::Rival, rival.cause.into(), Some(name.into()), vec![rival.as_rival()]);
             }
-            // A parameter of the nominal model that the fit holds at its limit takes the place of a cause of its own:
-            // what it leaves is not told from a cause of its kind.
-            let is_selected = |law: &Law| selected.terms.iter().any(|term| term.law.label == law.label);
-            let at_limit = |law: &&Law| {
-                let change = select::tolerance(problem, &selected.fit, law).and_then(|judged| judged.value);
-                selected.terms[k].law.wrong.kin.share(law.wrong.kin) == 1.0
-                    && change.is_some_and(|stds| stds.abs() > OUT_OF_TOLERANCE)
-                    && !is_selected(law)
-            };
-            let at_limit: Vec<CauseName> = laws.iter().filter(at_limit).filter_map(Law::cause).collect();
+            let at_limit = at_limit(search, selected, k);
             let others = rivals.iter().filter(|r| r.alike() && !at_limit.contains(&r.cause));
             let all = at_limit.iter().map(|cause| (*cause, 0.0)).chain(others.map(|r| (r.cause, r.misfit)));
             let (alike, misfits): (Vec<CauseName>, Vec<f64>) = all.take(3).unzip();
@@ -199,6 +190,18 @@ pub(super) fn conclude(
         set_aside: None,
         trace,
     }
+}
+
+/// Causes of the same kind as term `k` whose parameter of the nominal model the fit holds at its limit: it takes their
+/// place, and nobody can tell what of it is the term's.
+pub(super) fn at_limit(search: &Search<'_>, selected: &Selected<'_>, k: usize) -> Vec<CauseName> {
+    let is_held = |law: &&Law| {
+        let change = select::tolerance(&search.problem, &selected.fit, law).and_then(|judged| judged.value);
+        selected.terms[k].law.wrong.kin.share(law.wrong.kin) == 1.0
+            && change.is_some_and(|stds| stds.abs() > OUT_OF_TOLERANCE)
+            && selected.terms.iter().all(|term| term.law.label != law.label)
+    };
+    search.laws.iter().filter(is_held).filter_map(Law::cause).collect()
 }
 
 /// The zero of every session less that of the first, where the bench sets it anew: a law of it was chosen, or sessions

@@ -166,7 +166,7 @@ pub fn evaluate(
     (found, causes): (&Extended, &[CauseName]),
     tables: &ExtendedTables<'_>,
     prior: &Prior<'_>,
-    settings: &Settings,
+    settings: &Settings<'_>,
     remake: Option<&Remake<'_>>,
 ) -> Result<Evaluation, PipelineError> {
     let (sessions, used) = split(&recording.sessions);
