@@ -520,7 +520,9 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let scales = super::LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
         let on = super::Excitation::new(&rows, &drive, &base, &scales);
         let uncertain = super::prepare::uncertain(&on, &[], &[]);
-        super::resolution(&on, &super::library(&on), &uncertain, settings.averages, &[]).stride
+        let usual = rows.count_used() / settings.averages;
+        let hidden = super::hidden_by_averages(&on, &super::library(&on), &uncertain, usual, &[]);
+        if hidden.is_some() { 1 } else { usual }
     };
     let measured = |effects: &[&str]| recorded(effects, 5, 6000, 100.0, 2.0, 5);
     let cam = measured(&["cam_form_error:amplitude_arcsec=4,phase_rad=0.7"]);
