@@ -40,8 +40,11 @@ fn steps(share: f64) -> f64 {
     [0.3, -0.3, 1.0, -1.0, 0.1, -0.1, 0.6, -0.6][((share * 16.0) as usize) % 8]
 }
 
-/// Runs: what to do, and session by session how the drive is driven at a share (0 to 1) of its time.
-static MENU: [(&str, &[fn(f64) -> RunState]); 6] = {
+/// A run: its text, and session by session how the drive is driven at a share (0 to 1) of its time.
+type Run = (&'static str, &'static [fn(f64) -> RunState]);
+
+/// Runs to choose from.
+static MENU: [Run; 6] = {
     const fn state(turns: f64, torque: f64, warmer: f64, orientation: f64) -> RunState {
         RunState { turns, torque, warmer, orientation }
     }
@@ -145,9 +148,7 @@ pub fn next(
     noise: Noise,
 ) -> Option<(String, f64)> {
     use rayon::prelude::*;
-    let apart = |(text, run): &(&'static str, &[fn(f64) -> RunState])| {
-        (*text, least_apart(on, run, term, coefficients, alike, noise).unwrap_or(0.0))
-    };
+    let apart = |(text, run): &Run| (*text, least_apart(on, run, term, coefficients, alike, noise).unwrap_or(0.0));
     let all: Vec<(&str, f64)> = MENU.par_iter().map(apart).collect();
     let (text, apart) = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     (apart > WORTH_IT).then(|| (text.to_owned(), apart))
