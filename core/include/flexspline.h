@@ -68,6 +68,127 @@
 // Bytes of a saved state.
 #define FLEXSPLINE_SAVED_BYTES 72
 
+// Bytes of a record of telemetry.
+#define FLEXSPLINE_RECORD_BYTES 52
+
+// Numbers of a predictor.
+#define FLEXSPLINE_PREDICTOR_PARTS 34
+
+// Eight-byte words of a [`FlexsplineUpload`].
+#define FLEXSPLINE_UPLOAD_WORDS 3
+
+// Eight-byte words of a [`FlexsplineWatch`].
+#define FLEXSPLINE_WATCH_WORDS 6
+
+// Eight-byte words of a [`FlexsplinePredictor`].
+#define FLEXSPLINE_PREDICTOR_WORDS 19
+
+// Eight-byte words of a [`FlexsplineObserver`].
+#define FLEXSPLINE_OBSERVER_WORDS 4
+
+// The mode changed: `mode_before`, `mode`.
+#define FLEXSPLINE_EVENT_MODE 1
+
+// The health of the table changed: `health_before`, `health`.
+#define FLEXSPLINE_EVENT_HEALTH 2
+
+// A page of one image is damaged and can be written again from the other: `damaged_image`, `damaged_page`.
+#define FLEXSPLINE_EVENT_PAGE_DAMAGED 4
+
+// The copies of the table disagreed in what was read.
+#define FLEXSPLINE_EVENT_TABLE_DOUBT 8
+
+// No correction can be made from now on.
+#define FLEXSPLINE_EVENT_FALLBACK 16
+
+// Corrections are made again.
+#define FLEXSPLINE_EVENT_RECOVERED 32
+
+// A tick came late: `missed_ticks`.
+#define FLEXSPLINE_EVENT_OVERRUN 64
+
+// The state was not whole.
+#define FLEXSPLINE_EVENT_STATE_TORN 128
+
+// Eight-byte words of a [`FlexsplineEncoder`].
+#define FLEXSPLINE_ENCODER_WORDS 7
+
+// Largest number of coefficients of a learner.
+#define FLEXSPLINE_LEARNER_COEFFICIENTS 7
+
+// Eight-byte words of a [`FlexsplineLearner`].
+#define FLEXSPLINE_LEARNER_WORDS 68
+
+// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 32.
+#define FLEXSPLINE_SAVED_LEARNER_BYTES 172
+
+// Largest number of springs.
+#define FLEXSPLINE_SLIP_SPRINGS 8
+
+// Eight-byte words of a [`FlexsplineSlip`].
+#define FLEXSPLINE_SLIP_WORDS 24
+
+// Bytes of saved springs with the largest number of them; n of them take 8 n + 36.
+#define FLEXSPLINE_SAVED_SLIP_BYTES 100
+
+// Offset of the mean error, rad.
+#define FLEXSPLINE_TERM_MEAN 0
+
+// Wind-up beside that of the table, rad/(N m).
+#define FLEXSPLINE_TERM_WIND_UP 1
+
+// Half-width of the play beside that of the table, rad.
+#define FLEXSPLINE_TERM_HALF_WIDTH 2
+
+// Cosine of `order` periods in a generator turn, rad.
+#define FLEXSPLINE_TERM_COSINE 3
+
+// Sine of `order` periods in a generator turn, rad.
+#define FLEXSPLINE_TERM_SINE 4
+
+// The adjustment is zero; what was learnt is kept. The start.
+#define FLEXSPLINE_LEARNING_OFF 0
+
+// The learnt coefficients are used and stay as they are.
+#define FLEXSPLINE_LEARNING_FROZEN 1
+
+// Measurements are used.
+#define FLEXSPLINE_LEARNING_ON 2
+
+// There was no measurement, or nothing is to be learnt.
+#define FLEXSPLINE_VERDICT_IDLE 0
+
+// It was used.
+#define FLEXSPLINE_VERDICT_USED 1
+
+// Within what is not known anyway: it says nothing.
+#define FLEXSPLINE_VERDICT_QUIET 2
+
+// Beyond the gate.
+#define FLEXSPLINE_VERDICT_OUTLIER 3
+
+// Too soon after a reversal.
+#define FLEXSPLINE_VERDICT_UNSETTLED 4
+
+// No coefficient changes the output enough here to be seen in the noise.
+#define FLEXSPLINE_VERDICT_UNEXCITED 5
+
+// The tick itself was not to be trusted.
+#define FLEXSPLINE_VERDICT_UNTRUSTED 6
+
+// What was learnt, or the settings, are lost to an upset: nothing is added, and the uncertainty is all that can have
+// been added. Until `flexspline_learner_set`, or until the learner is made anew.
+#define FLEXSPLINE_VERDICT_LOST 7
+
+// Eight-byte words of a [`FlexsplineAdjustment`].
+#define FLEXSPLINE_ADJUSTMENT_WORDS 3
+
+// Springs that slip with the nominal output: widths in rad, 0 to 0.05, gains without a unit.
+#define FLEXSPLINE_SLIP_OF_OUTPUT 0
+
+// Springs that slip with the load torque: widths in N m, 0 to 10000, gains in rad/(N m).
+#define FLEXSPLINE_SLIP_OF_TORQUE 1
+
 // Version of this header: the first of three numbers.
 #define FLEXSPLINE_VERSION_MAJOR 0
 
@@ -152,151 +273,6 @@
 // It is not.
 #define FLEXSPLINE_IDENTITY_OTHER 2
 
-// Eight-byte words of a [`FlexsplineEncoder`].
-#define FLEXSPLINE_ENCODER_WORDS 7
-
-// Eight-byte words of a [`FlexsplineTorquePath`].
-#define FLEXSPLINE_TORQUE_PATH_WORDS 8
-
-// Eight-byte words of a [`FlexsplineAged`].
-#define FLEXSPLINE_AGED_WORDS 4
-
-// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the
-// target comes off what the tick gives, unless that inertia torque is the larger: while a target speeds up from a
-// light load the flank does not change.
-#define FLEXSPLINE_TORQUE_ON_LOAD 0
-
-// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its
-// friction.
-#define FLEXSPLINE_TORQUE_IN_MESH 1
-
-// Largest number of coefficients of a learner.
-#define FLEXSPLINE_LEARNER_COEFFICIENTS 7
-
-// Eight-byte words of a [`FlexsplineLearner`].
-#define FLEXSPLINE_LEARNER_WORDS 68
-
-// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 32.
-#define FLEXSPLINE_SAVED_LEARNER_BYTES 172
-
-// Largest number of springs.
-#define FLEXSPLINE_SLIP_SPRINGS 8
-
-// Eight-byte words of a [`FlexsplineSlip`].
-#define FLEXSPLINE_SLIP_WORDS 24
-
-// Bytes of saved springs with the largest number of them; n of them take 8 n + 36.
-#define FLEXSPLINE_SAVED_SLIP_BYTES 100
-
-// Offset of the mean error, rad.
-#define FLEXSPLINE_TERM_MEAN 0
-
-// Wind-up beside that of the table, rad/(N m).
-#define FLEXSPLINE_TERM_WIND_UP 1
-
-// Half-width of the play beside that of the table, rad.
-#define FLEXSPLINE_TERM_HALF_WIDTH 2
-
-// Cosine of `order` periods in a generator turn, rad.
-#define FLEXSPLINE_TERM_COSINE 3
-
-// Sine of `order` periods in a generator turn, rad.
-#define FLEXSPLINE_TERM_SINE 4
-
-// The adjustment is zero; what was learnt is kept. The start.
-#define FLEXSPLINE_LEARNING_OFF 0
-
-// The learnt coefficients are used and stay as they are.
-#define FLEXSPLINE_LEARNING_FROZEN 1
-
-// Measurements are used.
-#define FLEXSPLINE_LEARNING_ON 2
-
-// There was no measurement, or nothing is to be learnt.
-#define FLEXSPLINE_VERDICT_IDLE 0
-
-// It was used.
-#define FLEXSPLINE_VERDICT_USED 1
-
-// Within what is not known anyway: it says nothing.
-#define FLEXSPLINE_VERDICT_QUIET 2
-
-// Beyond the gate.
-#define FLEXSPLINE_VERDICT_OUTLIER 3
-
-// Too soon after a reversal.
-#define FLEXSPLINE_VERDICT_UNSETTLED 4
-
-// No coefficient changes the output enough here to be seen in the noise.
-#define FLEXSPLINE_VERDICT_UNEXCITED 5
-
-// The tick itself was not to be trusted.
-#define FLEXSPLINE_VERDICT_UNTRUSTED 6
-
-// What was learnt, or the settings, are lost to an upset: nothing is added, and the uncertainty is all that can have
-// been added. Until `flexspline_learner_set`, or until the learner is made anew.
-#define FLEXSPLINE_VERDICT_LOST 7
-
-// Eight-byte words of a [`FlexsplineAdjustment`].
-#define FLEXSPLINE_ADJUSTMENT_WORDS 3
-
-// Springs that slip with the nominal output: widths in rad, 0 to 0.05, gains without a unit.
-#define FLEXSPLINE_SLIP_OF_OUTPUT 0
-
-// Springs that slip with the load torque: widths in N m, 0 to 10000, gains in rad/(N m).
-#define FLEXSPLINE_SLIP_OF_TORQUE 1
-
-// Eight-byte words of a [`FlexsplineRecorder`].
-#define FLEXSPLINE_RECORDER_WORDS 4
-
-// Where all places hold a record: the oldest is lost, the end of a story is kept.
-#define FLEXSPLINE_FULL_LOSE_OLDEST 0
-
-// The new one is lost, the beginning is kept.
-#define FLEXSPLINE_FULL_LOSE_NEW 1
-
-// Bytes of a record of telemetry.
-#define FLEXSPLINE_RECORD_BYTES 52
-
-// Numbers of a predictor.
-#define FLEXSPLINE_PREDICTOR_PARTS 34
-
-// Eight-byte words of a [`FlexsplineUpload`].
-#define FLEXSPLINE_UPLOAD_WORDS 3
-
-// Eight-byte words of a [`FlexsplineWatch`].
-#define FLEXSPLINE_WATCH_WORDS 6
-
-// Eight-byte words of a [`FlexsplinePredictor`].
-#define FLEXSPLINE_PREDICTOR_WORDS 19
-
-// Eight-byte words of a [`FlexsplineObserver`].
-#define FLEXSPLINE_OBSERVER_WORDS 4
-
-// The mode changed: `mode_before`, `mode`.
-#define FLEXSPLINE_EVENT_MODE 1
-
-// The health of the table changed: `health_before`, `health`.
-#define FLEXSPLINE_EVENT_HEALTH 2
-
-// A page of one image is damaged and can be written again from the other: `damaged_image`, `damaged_page`.
-#define FLEXSPLINE_EVENT_PAGE_DAMAGED 4
-
-// The copies of the table disagreed in what was read.
-#define FLEXSPLINE_EVENT_TABLE_DOUBT 8
-
-// No correction can be made from now on.
-#define FLEXSPLINE_EVENT_FALLBACK 16
-
-// Corrections are made again.
-#define FLEXSPLINE_EVENT_RECOVERED 32
-
-// A tick came late: `missed_ticks`.
-#define FLEXSPLINE_EVENT_OVERRUN 64
-
-// The state was not whole.
-#define FLEXSPLINE_EVENT_STATE_TORN 128
-
 // Eight-byte words of a [`FlexsplineStartUp`].
 #define FLEXSPLINE_START_UP_WORDS 32
 
@@ -332,6 +308,30 @@
 
 // A reading came and went, or was no number.
 #define FLEXSPLINE_IMPLAUSIBLE_LOST 1024
+
+// Eight-byte words of a [`FlexsplineRecorder`].
+#define FLEXSPLINE_RECORDER_WORDS 4
+
+// Where all places hold a record: the oldest is lost, the end of a story is kept.
+#define FLEXSPLINE_FULL_LOSE_OLDEST 0
+
+// The new one is lost, the beginning is kept.
+#define FLEXSPLINE_FULL_LOSE_NEW 1
+
+// Eight-byte words of a [`FlexsplineTorquePath`].
+#define FLEXSPLINE_TORQUE_PATH_WORDS 8
+
+// Eight-byte words of a [`FlexsplineAged`].
+#define FLEXSPLINE_AGED_WORDS 4
+
+// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the
+// target comes off what the tick gives, unless that inertia torque is the larger: while a target speeds up from a
+// light load the flank does not change.
+#define FLEXSPLINE_TORQUE_ON_LOAD 0
+
+// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its
+// friction.
+#define FLEXSPLINE_TORQUE_IN_MESH 1
 
 // Status of a call.
 typedef enum FlexsplineStatus {
@@ -521,57 +521,6 @@ typedef struct FlexsplineAdjustment {
   uint64_t opaque[FLEXSPLINE_ADJUSTMENT_WORDS];
 } FlexsplineAdjustment;
 
-// An encoder, and where it is.
-typedef struct FlexsplineEncoder {
-  uint64_t opaque[FLEXSPLINE_ENCODER_WORDS];
-} FlexsplineEncoder;
-
-// How an encoder counts.
-typedef struct FlexsplineEncoderSettings {
-  // Reading at the angle 0, counts of the encoder: -2^62 to 2^62.
-  int64_t zero_counts;
-  // Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
-  uint32_t counts_per_turn;
-  // Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed
-  // register is given by its bits, those above them zero.
-  uint8_t wrap_bits;
-  // 1 if it counts up where the angle falls, else 0.
-  uint8_t reversed;
-} FlexsplineEncoderSettings;
-
-// From a reading of torque to the one that a tick is given.
-typedef struct FlexsplineTorquePath {
-  uint64_t opaque[FLEXSPLINE_TORQUE_PATH_WORDS];
-} FlexsplineTorquePath;
-
-// Settings of the processing of a torque reading.
-typedef struct FlexsplineTorqueSettings {
-  // Time from tick to tick, s.
-  float tick_s;
-  // Corner of the low-pass, Hz: of the first order.
-  float bandwidth_hz;
-  // Coulomb drag of the output of this unit, N m, whichever torque is read; 0 or more.
-  float drag_n_m;
-  // Coulomb drag that the table was made with, N m; 0 or more.
-  float table_drag_n_m;
-  // A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the
-  // peak of the noise behind the low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
-  float hold_n_m;
-} FlexsplineTorqueSettings;
-
-// A measurement with its age.
-typedef struct FlexsplineAged {
-  uint64_t opaque[FLEXSPLINE_AGED_WORDS];
-} FlexsplineAged;
-
-// How the generator has to move so that the output moves as it shall.
-typedef struct FlexsplineMotionAhead {
-  // Its rate, rad/s.
-  float rate_rad_s;
-  // Its acceleration, rad/s^2.
-  float acceleration_rad_s2;
-} FlexsplineMotionAhead;
-
 // Expected motion of the output.
 typedef struct FlexsplinePrediction {
   // Output angle, counts of 2^-32 turn: nominal plus transmission error.
@@ -638,154 +587,6 @@ typedef struct FlexsplineImageReport {
   // (`flexspline_generator_name`).
   uint8_t generator;
 } FlexsplineImageReport;
-
-// A few coefficients that measurements of the output teach, and what is learnt.
-typedef struct FlexsplineLearner {
-  uint64_t opaque[FLEXSPLINE_LEARNER_WORDS];
-} FlexsplineLearner;
-
-// How a learner learns.
-typedef struct FlexsplineLearnSettings {
-  // Standard deviation of one measurement, rad at the output: its noise and what the table missed of its samples.
-  float noise_rad;
-  // Measurements after which what was learnt in their direction is forgotten: 1 to 1000000.
-  float memory_measurements;
-  // Standard deviations beyond which an innovation is an outlier: 1 to 100.
-  float gate;
-  // Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to
-  // 0.049.
-  float settle_rad;
-  // Torque beyond which the wind-up's share grows no more, N m.
-  float torque_limit_n_m;
-} FlexsplineLearnSettings;
-
-// A coefficient to be learnt.
-typedef struct FlexsplineCoefficient {
-  // It stays within +- this: rad, or rad/(N m); above 0, 0.049 at most.
-  float limit;
-  // Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the
-  // limit.
-  float initial_std;
-  // `FLEXSPLINE_TERM_...`.
-  uint8_t term;
-  // Periods in a generator turn, 1 to 255, of a cosine or sine; else 0.
-  uint8_t order;
-} FlexsplineCoefficient;
-
-// A learner's addition in the next tick.
-typedef struct FlexsplineAdapted {
-  // For `FlexsplineInput` of the next tick: mean error, counts of 2^-32 turn at the output.
-  int32_t mean_counts;
-  // The same: half-width of the play.
-  int32_t half_width_counts;
-  // Standard deviation of what it adds to the error, rad.
-  float uncertainty_rad;
-  // Verdict on the measurement: `FLEXSPLINE_VERDICT_...`.
-  uint8_t verdict;
-} FlexsplineAdapted;
-
-// A coefficient as learnt.
-typedef struct FlexsplineLearnt {
-  // Its value: rad, or rad/(N m).
-  float value;
-  // Its standard deviation, same unit.
-  float std;
-} FlexsplineLearnt;
-
-// Counts of measurements by verdict; counters stop at their largest value.
-typedef struct FlexsplineLearnerReport {
-  // Used.
-  uint32_t used;
-  // Within what is not known anyway.
-  uint32_t quiet;
-  // Outliers.
-  uint32_t outliers;
-  // Outliers in a row until now: many say that the output encoder or its zero is not what it was.
-  uint32_t outliers_in_a_row;
-  // Too soon after a reversal.
-  uint32_t unsettled;
-  // No coefficient was excited.
-  uint32_t unexcited;
-  // The tick was not to be trusted.
-  uint32_t untrusted;
-  // Coefficients held at their limit, once for each and each measurement.
-  uint32_t limited;
-  // Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the
-  // state was hit by an upset.
-  uint32_t restarts;
-  // `FLEXSPLINE_LEARNING_...`.
-  uint8_t learning;
-  // Number of coefficients.
-  uint8_t coefficients;
-} FlexsplineLearnerReport;
-
-// Springs that slip, and their deflections.
-typedef struct FlexsplineSlip {
-  uint64_t opaque[FLEXSPLINE_SLIP_WORDS];
-} FlexsplineSlip;
-
-// A spring that slips.
-typedef struct FlexsplineSpring {
-  // Deflection at which it slips: rad of the nominal output, or N m.
-  float width;
-  // Error per deflection: without a unit, or rad/(N m).
-  float gain;
-} FlexsplineSpring;
-
-// Contribution of the springs.
-typedef struct FlexsplineSlipReport {
-  // Error at the output, rad.
-  float error_rad;
-  // It lies within +- this, rad: 0 once every spring has slipped from one end to the other.
-  float uncertainty_rad;
-  // The error for `flexspline_input_add`, counts of 2^-32 turn at the output.
-  int32_t mean_counts;
-  // 1 if every deflection is known, else 0.
-  uint8_t is_known;
-} FlexsplineSlipReport;
-
-// Which records of the caller's list wait to be sent.
-typedef struct FlexsplineRecorder {
-  uint64_t opaque[FLEXSPLINE_RECORDER_WORDS];
-} FlexsplineRecorder;
-
-// One tick, as it is kept and as it was sent.
-typedef struct FlexsplineRecord {
-  // Estimated output, counts of 2^-32 turn.
-  int64_t output_counts;
-  // Number of the tick.
-  uint32_t tick;
-  // Transmission error, rad.
-  float transmission_error_rad;
-  // It lies within +- this, rad.
-  float uncertainty_rad;
-  // Correction, rad at the output: target less command over ratio.
-  float correction_rad;
-  // Part of it that the limiter held back, rad.
-  float held_back_rad;
-  // Number of the record; wraps.
-  uint16_t number;
-  // Records lost since the start; wraps.
-  uint16_t lost;
-  // `FLEXSPLINE_FLAG_...`.
-  uint16_t flags;
-  // Ticks missed since the start; wraps, as all counters.
-  uint16_t missed_ticks;
-  // Ticks that were done again because something was not whole.
-  uint16_t doubtful_ticks;
-  // Words of the copies that were found to differ and made anew.
-  uint16_t words_mended;
-  // Words that could not be made anew.
-  uint16_t words_skipped;
-  // Pages of an image found damaged.
-  uint16_t pages_damaged;
-  // `FLEXSPLINE_QUALITY_...`.
-  uint8_t quality;
-  // `FLEXSPLINE_MODE_...`.
-  uint8_t mode;
-  // `FLEXSPLINE_HEALTH_...`.
-  uint8_t health;
-} FlexsplineRecord;
 
 // How far a table on its way in has come.
 typedef struct FlexsplineUpload {
@@ -923,6 +724,129 @@ typedef struct FlexsplineAhead {
   uint8_t quality;
 } FlexsplineAhead;
 
+// An encoder, and where it is.
+typedef struct FlexsplineEncoder {
+  uint64_t opaque[FLEXSPLINE_ENCODER_WORDS];
+} FlexsplineEncoder;
+
+// How an encoder counts.
+typedef struct FlexsplineEncoderSettings {
+  // Reading at the angle 0, counts of the encoder: -2^62 to 2^62.
+  int64_t zero_counts;
+  // Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
+  uint32_t counts_per_turn;
+  // Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed
+  // register is given by its bits, those above them zero.
+  uint8_t wrap_bits;
+  // 1 if it counts up where the angle falls, else 0.
+  uint8_t reversed;
+} FlexsplineEncoderSettings;
+
+// A few coefficients that measurements of the output teach, and what is learnt.
+typedef struct FlexsplineLearner {
+  uint64_t opaque[FLEXSPLINE_LEARNER_WORDS];
+} FlexsplineLearner;
+
+// How a learner learns.
+typedef struct FlexsplineLearnSettings {
+  // Standard deviation of one measurement, rad at the output: its noise and what the table missed of its samples.
+  float noise_rad;
+  // Measurements after which what was learnt in their direction is forgotten: 1 to 1000000.
+  float memory_measurements;
+  // Standard deviations beyond which an innovation is an outlier: 1 to 100.
+  float gate;
+  // Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to
+  // 0.049.
+  float settle_rad;
+  // Torque beyond which the wind-up's share grows no more, N m.
+  float torque_limit_n_m;
+} FlexsplineLearnSettings;
+
+// A coefficient to be learnt.
+typedef struct FlexsplineCoefficient {
+  // It stays within +- this: rad, or rad/(N m); above 0, 0.049 at most.
+  float limit;
+  // Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the
+  // limit.
+  float initial_std;
+  // `FLEXSPLINE_TERM_...`.
+  uint8_t term;
+  // Periods in a generator turn, 1 to 255, of a cosine or sine; else 0.
+  uint8_t order;
+} FlexsplineCoefficient;
+
+// A learner's addition in the next tick.
+typedef struct FlexsplineAdapted {
+  // For `FlexsplineInput` of the next tick: mean error, counts of 2^-32 turn at the output.
+  int32_t mean_counts;
+  // The same: half-width of the play.
+  int32_t half_width_counts;
+  // Standard deviation of what it adds to the error, rad.
+  float uncertainty_rad;
+  // Verdict on the measurement: `FLEXSPLINE_VERDICT_...`.
+  uint8_t verdict;
+} FlexsplineAdapted;
+
+// A coefficient as learnt.
+typedef struct FlexsplineLearnt {
+  // Its value: rad, or rad/(N m).
+  float value;
+  // Its standard deviation, same unit.
+  float std;
+} FlexsplineLearnt;
+
+// Counts of measurements by verdict; counters stop at their largest value.
+typedef struct FlexsplineLearnerReport {
+  // Used.
+  uint32_t used;
+  // Within what is not known anyway.
+  uint32_t quiet;
+  // Outliers.
+  uint32_t outliers;
+  // Outliers in a row until now: many say that the output encoder or its zero is not what it was.
+  uint32_t outliers_in_a_row;
+  // Too soon after a reversal.
+  uint32_t unsettled;
+  // No coefficient was excited.
+  uint32_t unexcited;
+  // The tick was not to be trusted.
+  uint32_t untrusted;
+  // Coefficients held at their limit, once for each and each measurement.
+  uint32_t limited;
+  // Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the
+  // state was hit by an upset.
+  uint32_t restarts;
+  // `FLEXSPLINE_LEARNING_...`.
+  uint8_t learning;
+  // Number of coefficients.
+  uint8_t coefficients;
+} FlexsplineLearnerReport;
+
+// Springs that slip, and their deflections.
+typedef struct FlexsplineSlip {
+  uint64_t opaque[FLEXSPLINE_SLIP_WORDS];
+} FlexsplineSlip;
+
+// A spring that slips.
+typedef struct FlexsplineSpring {
+  // Deflection at which it slips: rad of the nominal output, or N m.
+  float width;
+  // Error per deflection: without a unit, or rad/(N m).
+  float gain;
+} FlexsplineSpring;
+
+// Contribution of the springs.
+typedef struct FlexsplineSlipReport {
+  // Error at the output, rad.
+  float error_rad;
+  // It lies within +- this, rad: 0 once every spring has slipped from one end to the other.
+  float uncertainty_rad;
+  // The error for `flexspline_input_add`, counts of 2^-32 turn at the output.
+  int32_t mean_counts;
+  // 1 if every deflection is known, else 0.
+  uint8_t is_known;
+} FlexsplineSlipReport;
+
 // A test of the sensors under way.
 typedef struct FlexsplineStartUp {
   uint64_t opaque[FLEXSPLINE_START_UP_WORDS];
@@ -967,6 +891,84 @@ typedef struct FlexsplineStartUpStep {
   // 1 with the last tick of the test, else 0.
   uint8_t is_done;
 } FlexsplineStartUpStep;
+
+// Which records of the caller's list wait to be sent.
+typedef struct FlexsplineRecorder {
+  uint64_t opaque[FLEXSPLINE_RECORDER_WORDS];
+} FlexsplineRecorder;
+
+// One tick, as it is kept and as it was sent.
+typedef struct FlexsplineRecord {
+  // Estimated output, counts of 2^-32 turn.
+  int64_t output_counts;
+  // Number of the tick.
+  uint32_t tick;
+  // Transmission error, rad.
+  float transmission_error_rad;
+  // It lies within +- this, rad.
+  float uncertainty_rad;
+  // Correction, rad at the output: target less command over ratio.
+  float correction_rad;
+  // Part of it that the limiter held back, rad.
+  float held_back_rad;
+  // Number of the record; wraps.
+  uint16_t number;
+  // Records lost since the start; wraps.
+  uint16_t lost;
+  // `FLEXSPLINE_FLAG_...`.
+  uint16_t flags;
+  // Ticks missed since the start; wraps, as all counters.
+  uint16_t missed_ticks;
+  // Ticks that were done again because something was not whole.
+  uint16_t doubtful_ticks;
+  // Words of the copies that were found to differ and made anew.
+  uint16_t words_mended;
+  // Words that could not be made anew.
+  uint16_t words_skipped;
+  // Pages of an image found damaged.
+  uint16_t pages_damaged;
+  // `FLEXSPLINE_QUALITY_...`.
+  uint8_t quality;
+  // `FLEXSPLINE_MODE_...`.
+  uint8_t mode;
+  // `FLEXSPLINE_HEALTH_...`.
+  uint8_t health;
+} FlexsplineRecord;
+
+// From a reading of torque to the one that a tick is given.
+typedef struct FlexsplineTorquePath {
+  uint64_t opaque[FLEXSPLINE_TORQUE_PATH_WORDS];
+} FlexsplineTorquePath;
+
+// Settings of the processing of a torque reading.
+typedef struct FlexsplineTorqueSettings {
+  // Time from tick to tick, s.
+  float tick_s;
+  // Corner of the low-pass, Hz: of the first order.
+  float bandwidth_hz;
+  // Coulomb drag of the output of this unit, N m, whichever torque is read; 0 or more.
+  float drag_n_m;
+  // Coulomb drag that the table was made with, N m; 0 or more.
+  float table_drag_n_m;
+  // A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the
+  // peak of the noise behind the low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
+  float hold_n_m;
+} FlexsplineTorqueSettings;
+
+// A measurement with its age.
+typedef struct FlexsplineAged {
+  uint64_t opaque[FLEXSPLINE_AGED_WORDS];
+} FlexsplineAged;
+
+// How the generator has to move so that the output moves as it shall.
+typedef struct FlexsplineMotionAhead {
+  // Its rate, rad/s.
+  float rate_rad_s;
+  // Its acceleration, rad/s^2.
+  float acceleration_rad_s2;
+} FlexsplineMotionAhead;
+
+
 
 #ifdef __cplusplus
 extern "C" {
@@ -1095,69 +1097,141 @@ enum FlexsplineStatus flexspline_tick_adjusted(const struct FlexsplineJoint *joi
                                                const struct FlexsplineAdjustment *adjustment,
                                                struct FlexsplineOutput *output);
 
-// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the
-// program was compiled with another header, or with options that change a layout (packed structures, enumerations of
-// another size): do not go on.
-uint32_t flexspline_layout(void);
+// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state
+// rests, which stays as it is. A path with a reversal is that of ticks.
+enum FlexsplineStatus flexspline_forward(const struct FlexsplineJoint *joint,
+                                         const struct FlexsplineStore *store,
+                                         const struct FlexsplineState *state,
+                                         int64_t generator_counts,
+                                         float torque_n_m,
+                                         struct FlexsplinePrediction *prediction);
 
-// Version of this library, as text.
-const char *flexspline_version(void);
+// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion
+// forward (+1) or backward (-1), or from where the state rests (0). No limiter and no mode: that is the tick's part.
+enum FlexsplineStatus flexspline_inverse(const struct FlexsplineJoint *joint,
+                                         const struct FlexsplineStore *store,
+                                         const struct FlexsplineState *state,
+                                         int64_t target_counts,
+                                         float torque_n_m,
+                                         int8_t direction,
+                                         struct FlexsplineCommand *command);
 
-// Version of this library, to compare with `FLEXSPLINE_VERSION_NUMBER` of the header.
-uint32_t flexspline_version_number(void);
+// Nominal output angle of a generator angle, counts of 2^-32 turn: generator over ratio.
+enum FlexsplineStatus flexspline_nominal_output(const struct FlexsplineJoint *joint,
+                                                int64_t generator_counts,
+                                                int64_t *output_counts);
 
-// Version of the table format that is read.
-uint16_t flexspline_format_version(void);
+// Generator angle whose nominal output is an output angle, counts of 2^-32 turn: output times ratio.
+enum FlexsplineStatus flexspline_nominal_generator(const struct FlexsplineJoint *joint,
+                                                   int64_t output_counts,
+                                                   int64_t *generator_counts);
 
-// Short text of a status.
-const char *flexspline_status_text(int status);
+// Ratio of a joint's drive, signed: generator turns in a turn of the output.
+enum FlexsplineStatus flexspline_ratio(const struct FlexsplineJoint *joint, float *ratio);
 
-// Name of a mode.
-const char *flexspline_mode_name(uint8_t mode);
+// Reports the position of a drive inside its play, as the last tick left it.
+enum FlexsplineStatus flexspline_state_play(const struct FlexsplineState *state,
+                                            struct FlexsplinePlay *play);
 
-// 1 if a mode may be followed by another, else 0: everything may become off or safe; off and hold tracking; tracking
-// hold.
-uint8_t flexspline_mode_may_become(uint8_t mode,
-                                   uint8_t next);
+// Checks one image in full, without a store, and reports its header. The work grows with the image: for
+// start-up, or the host.
+enum FlexsplineStatus flexspline_image_report(const uint8_t *image,
+                                              size_t image_bytes,
+                                              struct FlexsplineImageReport *report);
 
-// Name of a quality.
-const char *flexspline_quality_name(uint8_t quality);
+// How far units scatter about a table that a data sheet completed, as a share s of their stiffness: 0.3 of `+-30 %`; 0
+// of any other table. What the table says of wind-up may be off by s / (1 - s) of it, which no tick states. Checks the
+// image in full, as [`flexspline_image_report`] does.
+enum FlexsplineStatus flexspline_image_sheet_scatter(const uint8_t *image,
+                                                     size_t image_bytes,
+                                                     float *scatter);
 
-// Name of a health, as in `FlexsplineStoreReport`.
-const char *flexspline_health_name(uint8_t health);
+// Begins to receive a table of the given length. The buffer is the caller's and is given with every call; it is no
+// image in use.
+enum FlexsplineStatus flexspline_upload_begin(struct FlexsplineUpload *upload,
+                                              size_t announced);
 
-// Name of one flag: of `FLEXSPLINE_FLAG_...`, one bit at a time.
-const char *flexspline_flag_name(uint16_t flag);
+// Takes the bytes from `offset` on: `FLEXSPLINE_STATUS_ORDER` if they are not the next ones, which can still come.
+enum FlexsplineStatus flexspline_upload_chunk(struct FlexsplineUpload *upload,
+                                              uint8_t *buffer,
+                                              size_t buffer_bytes,
+                                              size_t offset,
+                                              const uint8_t *chunk,
+                                              size_t chunk_bytes);
 
-// Name of one event: of `FLEXSPLINE_EVENT_...`, one bit at a time.
-const char *flexspline_event_name(uint16_t event);
+// Checks a table of which all bytes came, in full, and reports its id; it can then be activated.
+enum FlexsplineStatus flexspline_upload_finish(const struct FlexsplineUpload *upload,
+                                               const uint8_t *buffer,
+                                               size_t buffer_bytes,
+                                               uint8_t (*table_id)[8]);
 
-// Name of what is implausible: of `FLEXSPLINE_IMPLAUSIBLE_...`, one bit at a time.
-const char *flexspline_implausible_name(uint16_t implausible);
+// Begins to watch for events: off, without a table.
+enum FlexsplineStatus flexspline_watch_init(struct FlexsplineWatch *watch);
 
-// Name of what is done in a tick that came late: of `FLEXSPLINE_OVERRUN_...`.
-const char *flexspline_overrun_name(uint8_t overrun);
+// Reports the changes, after `flexspline_tick`; `output` is that tick's output.
+enum FlexsplineStatus flexspline_watch_see(struct FlexsplineWatch *watch,
+                                           const struct FlexsplineState *state,
+                                           const struct FlexsplineStore *store,
+                                           const struct FlexsplineOutput *output,
+                                           struct FlexsplineEvents *events);
 
-// Name of a fixed member: of `FLEXSPLINE_FIXED_...`.
-const char *flexspline_fixed_member_name(uint8_t fixed_member);
+// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the
+// caller's: of the record, and of those that it could not keep.
+enum FlexsplineStatus flexspline_record(uint32_t tick,
+                                        uint16_t number,
+                                        uint16_t lost,
+                                        const struct FlexsplineState *state,
+                                        const struct FlexsplineStore *store,
+                                        const struct FlexsplineOutput *output,
+                                        uint8_t (*record)[FLEXSPLINE_RECORD_BYTES]);
 
-// Name of a kind of wave generator, as in `FlexsplineImageReport`.
-const char *flexspline_generator_name(uint8_t generator);
+// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not
+// contract.
+enum FlexsplineStatus flexspline_predictor_init(struct FlexsplinePredictor *predictor,
+                                                const float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
 
-// Name of how far an activation is: of `FLEXSPLINE_PROGRESS_...`.
-const char *flexspline_progress_name(uint8_t progress);
+// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double
+// precision. For the host, or for a start-up that has the time (some 20000 products of small matrices).
+// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
+enum FlexsplineStatus flexspline_predictor_of(struct FlexsplinePredictor *predictor,
+                                              const struct FlexsplineInertias *inertias,
+                                              const struct FlexsplineNoise *noise,
+                                              double tick_s);
 
-// Name of what was found of an identity: of `FLEXSPLINE_IDENTITY_...`.
-const char *flexspline_identity_name(uint8_t found);
+// Reports the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
+enum FlexsplineStatus flexspline_predictor_parts(const struct FlexsplinePredictor *predictor,
+                                                 float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
 
-// Name of what learning does: of `FLEXSPLINE_LEARNING_...`.
-const char *flexspline_learning_name(uint8_t learning);
+// Reports the largest error of the observer while the disturbances stay within their bounds: twist rad, speeds of
+// motor and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
+// precision.
+enum FlexsplineStatus flexspline_predictor_state_bound(const struct FlexsplinePredictor *predictor,
+                                                       const struct FlexsplineDisturbance *disturbance,
+                                                       float (*bound)[4]);
 
-// Name of what became of a measurement: of `FLEXSPLINE_VERDICT_...`.
-const char *flexspline_verdict_name(uint8_t verdict);
+// Makes an observer at rest, without load.
+enum FlexsplineStatus flexspline_observer_init(struct FlexsplineObserver *observer);
 
-// Name of a coefficient: of `FLEXSPLINE_TERM_...`.
-const char *flexspline_term_name(uint8_t term);
+// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
+// and the estimate stays; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or
+// predictor (one is mended): make them anew. The reported values are NaN then.
+enum FlexsplineStatus flexspline_observer_step(struct FlexsplineObserver *observer,
+                                               const struct FlexsplinePredictor *predictor,
+                                               const struct FlexsplineMeasured *measured);
+
+// Reports the estimates of an observer.
+enum FlexsplineStatus flexspline_observer_report(const struct FlexsplineObserver *observer,
+                                                 struct FlexsplineObserverReport *report);
+
+// Predicts the output some ticks from now, with the table as the output map of the two inertias. The work
+// grows with the ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
+enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predictor,
+                                         const struct FlexsplineObserver *observer,
+                                         const struct FlexsplineJoint *joint,
+                                         const struct FlexsplineStore *store,
+                                         const struct FlexsplineState *state,
+                                         const struct FlexsplineNow *now,
+                                         struct FlexsplineAhead *ahead);
 
 // Makes an encoder of its settings, `FLEXSPLINE_STATUS_ARGUMENT` if they cannot be; where it is is not known yet.
 enum FlexsplineStatus flexspline_encoder_init(struct FlexsplineEncoder *encoder,
@@ -1217,130 +1291,6 @@ float flexspline_rad_between(int64_t from_counts,
 uint8_t flexspline_is_due(uint32_t tick,
                           uint32_t divisor,
                           uint32_t offset);
-
-// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and
-// positive, or a drag or hold not finite or below 0. A torque in the mesh may change the flank in any tick, and any
-// reading is believed: `flexspline_torque_init_sensor` says more.
-enum FlexsplineStatus flexspline_torque_init(struct FlexsplineTorquePath *path,
-                                             const struct FlexsplineTorqueSettings *settings);
-
-// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the
-// flank it does not change it again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the
-// correction crosses the play then, and what its own motion makes of the torque has to die away. A reading beyond
-// `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
-enum FlexsplineStatus flexspline_torque_init_sensor(struct FlexsplineTorquePath *path,
-                                                    const struct FlexsplineTorqueSettings *settings,
-                                                    float settle_s,
-                                                    float largest_n_m);
-
-// One tick: a reading, N m, positive where it turns the output forward, where it was measured
-// (`FLEXSPLINE_TORQUE_...`), and the direction in which the output moves or moved last, +1 or -1; what to give to
-// `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far from the last
-// one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one
-// is mended): make the path anew.
-enum FlexsplineStatus flexspline_torque_tick(struct FlexsplineTorquePath *path,
-                                             uint8_t place,
-                                             float reading_n_m,
-                                             int8_t direction,
-                                             float *torque_n_m);
-
-// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to
-// the next, N m (a quarter of the largest reading and twice the drag without this call; a reading that changes by more
-// is believed once three in a row are near each other), and the number of ticks after which a reading that stays the
-// same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor
-// has noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
-enum FlexsplineStatus flexspline_torque_set_sensor(struct FlexsplineTorquePath *path,
-                                                   float jump_n_m,
-                                                   uint16_t frozen_ticks);
-
-// Nothing measured yet; what is older than `most_ticks` is not used.
-enum FlexsplineStatus flexspline_aged_init(struct FlexsplineAged *aged, uint16_t most_ticks);
-
-// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too
-// old, or was hit by an upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it
-// out.
-enum FlexsplineStatus flexspline_aged_tick(struct FlexsplineAged *aged,
-                                           uint8_t has_measured,
-                                           float measured,
-                                           float *value);
-
-// 1 if there is no value that may be used, else 0: ask for the sensor.
-enum FlexsplineStatus flexspline_aged_is_stale(const struct FlexsplineAged *aged,
-                                               uint8_t *is_stale);
-
-// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what
-// the error adds, along the way of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it
-// cannot feed a torque back. NaN where the table gives nothing. Two inverse solutions: for a tick that has the time,
-// or every few ticks.
-enum FlexsplineStatus flexspline_rate_ahead(const struct FlexsplineJoint *joint,
-                                            const struct FlexsplineStore *store,
-                                            int64_t target_counts,
-                                            float rate_rad_s,
-                                            float torque_n_m,
-                                            float ahead_s,
-                                            float *generator_rate_rad_s);
-
-// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way
-// of the target, and what a target asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and
-// generator times it goes to the motor's current; the load's inertia times `acceleration_rad_s2` over the ratio comes
-// on top. Both are NaN where the table gives nothing. Three inverse solutions.
-enum FlexsplineStatus flexspline_motion_ahead(const struct FlexsplineJoint *joint,
-                                              const struct FlexsplineStore *store,
-                                              int64_t target_counts,
-                                              float rate_rad_s,
-                                              float acceleration_rad_s2,
-                                              float torque_n_m,
-                                              float ahead_s,
-                                              struct FlexsplineMotionAhead *ahead);
-
-// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state
-// rests, which stays as it is. A path with a reversal is that of ticks.
-enum FlexsplineStatus flexspline_forward(const struct FlexsplineJoint *joint,
-                                         const struct FlexsplineStore *store,
-                                         const struct FlexsplineState *state,
-                                         int64_t generator_counts,
-                                         float torque_n_m,
-                                         struct FlexsplinePrediction *prediction);
-
-// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion
-// forward (+1) or backward (-1), or from where the state rests (0). No limiter and no mode: that is the tick's part.
-enum FlexsplineStatus flexspline_inverse(const struct FlexsplineJoint *joint,
-                                         const struct FlexsplineStore *store,
-                                         const struct FlexsplineState *state,
-                                         int64_t target_counts,
-                                         float torque_n_m,
-                                         int8_t direction,
-                                         struct FlexsplineCommand *command);
-
-// Nominal output angle of a generator angle, counts of 2^-32 turn: generator over ratio.
-enum FlexsplineStatus flexspline_nominal_output(const struct FlexsplineJoint *joint,
-                                                int64_t generator_counts,
-                                                int64_t *output_counts);
-
-// Generator angle whose nominal output is an output angle, counts of 2^-32 turn: output times ratio.
-enum FlexsplineStatus flexspline_nominal_generator(const struct FlexsplineJoint *joint,
-                                                   int64_t output_counts,
-                                                   int64_t *generator_counts);
-
-// Ratio of a joint's drive, signed: generator turns in a turn of the output.
-enum FlexsplineStatus flexspline_ratio(const struct FlexsplineJoint *joint, float *ratio);
-
-// Reports the position of a drive inside its play, as the last tick left it.
-enum FlexsplineStatus flexspline_state_play(const struct FlexsplineState *state,
-                                            struct FlexsplinePlay *play);
-
-// Checks one image in full, without a store, and reports its header. The work grows with the image: for
-// start-up, or the host.
-enum FlexsplineStatus flexspline_image_report(const uint8_t *image,
-                                              size_t image_bytes,
-                                              struct FlexsplineImageReport *report);
-
-// How far units scatter about a table that a data sheet completed, as a share s of their stiffness: 0.3 of `+-30 %`; 0
-// of any other table. What the table says of wind-up may be off by s / (1 - s) of it, which no tick states. Checks the
-// image in full, as [`flexspline_image_report`] does.
-enum FlexsplineStatus flexspline_image_sheet_scatter(const uint8_t *image,
-                                                     size_t image_bytes,
-                                                     float *scatter);
 
 // Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off;
 // `FLEXSPLINE_STATUS_ARGUMENT` if a setting is out of its range. An update takes as long with one as with all.
@@ -1468,6 +1418,101 @@ enum FlexsplineStatus flexspline_input_add_rad(struct FlexsplineInput *input,
                                                float mean_rad,
                                                float half_width_rad);
 
+// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the
+// program was compiled with another header, or with options that change a layout (packed structures, enumerations of
+// another size): do not go on.
+uint32_t flexspline_layout(void);
+
+// Version of this library, as text.
+const char *flexspline_version(void);
+
+// Version of this library, to compare with `FLEXSPLINE_VERSION_NUMBER` of the header.
+uint32_t flexspline_version_number(void);
+
+// Version of the table format that is read.
+uint16_t flexspline_format_version(void);
+
+// Short text of a status.
+const char *flexspline_status_text(int status);
+
+// Name of a mode.
+const char *flexspline_mode_name(uint8_t mode);
+
+// 1 if a mode may be followed by another, else 0: everything may become off or safe; off and hold tracking; tracking
+// hold.
+uint8_t flexspline_mode_may_become(uint8_t mode,
+                                   uint8_t next);
+
+// Name of a quality.
+const char *flexspline_quality_name(uint8_t quality);
+
+// Name of a health, as in `FlexsplineStoreReport`.
+const char *flexspline_health_name(uint8_t health);
+
+// Name of one flag: of `FLEXSPLINE_FLAG_...`, one bit at a time.
+const char *flexspline_flag_name(uint16_t flag);
+
+// Name of one event: of `FLEXSPLINE_EVENT_...`, one bit at a time.
+const char *flexspline_event_name(uint16_t event);
+
+// Name of what is implausible: of `FLEXSPLINE_IMPLAUSIBLE_...`, one bit at a time.
+const char *flexspline_implausible_name(uint16_t implausible);
+
+// Name of what is done in a tick that came late: of `FLEXSPLINE_OVERRUN_...`.
+const char *flexspline_overrun_name(uint8_t overrun);
+
+// Name of a fixed member: of `FLEXSPLINE_FIXED_...`.
+const char *flexspline_fixed_member_name(uint8_t fixed_member);
+
+// Name of a kind of wave generator, as in `FlexsplineImageReport`.
+const char *flexspline_generator_name(uint8_t generator);
+
+// Name of how far an activation is: of `FLEXSPLINE_PROGRESS_...`.
+const char *flexspline_progress_name(uint8_t progress);
+
+// Name of what was found of an identity: of `FLEXSPLINE_IDENTITY_...`.
+const char *flexspline_identity_name(uint8_t found);
+
+// Name of what learning does: of `FLEXSPLINE_LEARNING_...`.
+const char *flexspline_learning_name(uint8_t learning);
+
+// Name of what became of a measurement: of `FLEXSPLINE_VERDICT_...`.
+const char *flexspline_verdict_name(uint8_t verdict);
+
+// Name of a coefficient: of `FLEXSPLINE_TERM_...`.
+const char *flexspline_term_name(uint8_t term);
+
+// Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
+// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to decide or too long, or the ticks too
+// few.
+enum FlexsplineStatus flexspline_start_up_init(struct FlexsplineStartUp *start_up,
+                                               const struct FlexsplineJoint *joint,
+                                               int64_t generator_counts,
+                                               const struct FlexsplineStartUpSettings *settings);
+
+// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the
+// last one what was found. Where something is implausible do not let the joint correct: its numbers are not what they
+// are taken for.
+enum FlexsplineStatus flexspline_start_up_step(struct FlexsplineStartUp *start_up,
+                                               const struct FlexsplineReadings *readings,
+                                               struct FlexsplineStartUpStep *step);
+
+// As `flexspline_slip_save`, with joint and table: the bytes are restored for the same ones alone.
+enum FlexsplineStatus flexspline_slip_save_for(const struct FlexsplineSlip *slip,
+                                               const struct FlexsplineJoint *joint,
+                                               const struct FlexsplineStore *store,
+                                               uint8_t *saved,
+                                               size_t saved_bytes,
+                                               size_t *written);
+
+// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table:
+// `FLEXSPLINE_STATUS_OTHER_TABLE` or `FLEXSPLINE_STATUS_OTHER_JOINT` (or other springs) if not.
+enum FlexsplineStatus flexspline_slip_restore_for(struct FlexsplineSlip *slip,
+                                                  const struct FlexsplineJoint *joint,
+                                                  const struct FlexsplineStore *store,
+                                                  const uint8_t *saved,
+                                                  size_t saved_bytes);
+
 // Makes a recorder for a list of the given number of records (1 or more), which is the caller's and given with every
 // call. It keeps every `divisor`-th tick, from `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where
 // there is no room.
@@ -1504,123 +1549,80 @@ enum FlexsplineStatus flexspline_record_encode(const struct FlexsplineRecord *re
 enum FlexsplineStatus flexspline_record_decode(const uint8_t *first,
                                                struct FlexsplineRecord *record);
 
-// Begins to receive a table of the given length. The buffer is the caller's and is given with every call; it is no
-// image in use.
-enum FlexsplineStatus flexspline_upload_begin(struct FlexsplineUpload *upload,
-                                              size_t announced);
+// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and
+// positive, or a drag or hold not finite or below 0. A torque in the mesh may change the flank in any tick, and any
+// reading is believed: `flexspline_torque_init_sensor` says more.
+enum FlexsplineStatus flexspline_torque_init(struct FlexsplineTorquePath *path,
+                                             const struct FlexsplineTorqueSettings *settings);
 
-// Takes the bytes from `offset` on: `FLEXSPLINE_STATUS_ORDER` if they are not the next ones, which can still come.
-enum FlexsplineStatus flexspline_upload_chunk(struct FlexsplineUpload *upload,
-                                              uint8_t *buffer,
-                                              size_t buffer_bytes,
-                                              size_t offset,
-                                              const uint8_t *chunk,
-                                              size_t chunk_bytes);
+// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the
+// flank it does not change it again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the
+// correction crosses the play then, and what its own motion makes of the torque has to die away. A reading beyond
+// `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
+enum FlexsplineStatus flexspline_torque_init_sensor(struct FlexsplineTorquePath *path,
+                                                    const struct FlexsplineTorqueSettings *settings,
+                                                    float settle_s,
+                                                    float largest_n_m);
 
-// Checks a table of which all bytes came, in full, and reports its id; it can then be activated.
-enum FlexsplineStatus flexspline_upload_finish(const struct FlexsplineUpload *upload,
-                                               const uint8_t *buffer,
-                                               size_t buffer_bytes,
-                                               uint8_t (*table_id)[8]);
+// One tick: a reading, N m, positive where it turns the output forward, where it was measured
+// (`FLEXSPLINE_TORQUE_...`), and the direction in which the output moves or moved last, +1 or -1; what to give to
+// `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far from the last
+// one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one
+// is mended): make the path anew.
+enum FlexsplineStatus flexspline_torque_tick(struct FlexsplineTorquePath *path,
+                                             uint8_t place,
+                                             float reading_n_m,
+                                             int8_t direction,
+                                             float *torque_n_m);
 
-// Begins to watch for events: off, without a table.
-enum FlexsplineStatus flexspline_watch_init(struct FlexsplineWatch *watch);
+// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to
+// the next, N m (a quarter of the largest reading and twice the drag without this call; a reading that changes by more
+// is believed once three in a row are near each other), and the number of ticks after which a reading that stays the
+// same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor
+// has noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
+enum FlexsplineStatus flexspline_torque_set_sensor(struct FlexsplineTorquePath *path,
+                                                   float jump_n_m,
+                                                   uint16_t frozen_ticks);
 
-// Reports the changes, after `flexspline_tick`; `output` is that tick's output.
-enum FlexsplineStatus flexspline_watch_see(struct FlexsplineWatch *watch,
-                                           const struct FlexsplineState *state,
-                                           const struct FlexsplineStore *store,
-                                           const struct FlexsplineOutput *output,
-                                           struct FlexsplineEvents *events);
+// Nothing measured yet; what is older than `most_ticks` is not used.
+enum FlexsplineStatus flexspline_aged_init(struct FlexsplineAged *aged, uint16_t most_ticks);
 
-// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the
-// caller's: of the record, and of those that it could not keep.
-enum FlexsplineStatus flexspline_record(uint32_t tick,
-                                        uint16_t number,
-                                        uint16_t lost,
-                                        const struct FlexsplineState *state,
-                                        const struct FlexsplineStore *store,
-                                        const struct FlexsplineOutput *output,
-                                        uint8_t (*record)[FLEXSPLINE_RECORD_BYTES]);
+// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too
+// old, or was hit by an upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it
+// out.
+enum FlexsplineStatus flexspline_aged_tick(struct FlexsplineAged *aged,
+                                           uint8_t has_measured,
+                                           float measured,
+                                           float *value);
 
-// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not
-// contract.
-enum FlexsplineStatus flexspline_predictor_init(struct FlexsplinePredictor *predictor,
-                                                const float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
+// 1 if there is no value that may be used, else 0: ask for the sensor.
+enum FlexsplineStatus flexspline_aged_is_stale(const struct FlexsplineAged *aged,
+                                               uint8_t *is_stale);
 
-// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double
-// precision. For the host, or for a start-up that has the time (some 20000 products of small matrices).
-// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
-enum FlexsplineStatus flexspline_predictor_of(struct FlexsplinePredictor *predictor,
-                                              const struct FlexsplineInertias *inertias,
-                                              const struct FlexsplineNoise *noise,
-                                              double tick_s);
+// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what
+// the error adds, along the way of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it
+// cannot feed a torque back. NaN where the table gives nothing. Two inverse solutions: for a tick that has the time,
+// or every few ticks.
+enum FlexsplineStatus flexspline_rate_ahead(const struct FlexsplineJoint *joint,
+                                            const struct FlexsplineStore *store,
+                                            int64_t target_counts,
+                                            float rate_rad_s,
+                                            float torque_n_m,
+                                            float ahead_s,
+                                            float *generator_rate_rad_s);
 
-// Reports the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
-enum FlexsplineStatus flexspline_predictor_parts(const struct FlexsplinePredictor *predictor,
-                                                 float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
-
-// Reports the largest error of the observer while the disturbances stay within their bounds: twist rad, speeds of
-// motor and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
-// precision.
-enum FlexsplineStatus flexspline_predictor_state_bound(const struct FlexsplinePredictor *predictor,
-                                                       const struct FlexsplineDisturbance *disturbance,
-                                                       float (*bound)[4]);
-
-// Makes an observer at rest, without load.
-enum FlexsplineStatus flexspline_observer_init(struct FlexsplineObserver *observer);
-
-// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
-// and the estimate stays; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or
-// predictor (one is mended): make them anew. The reported values are NaN then.
-enum FlexsplineStatus flexspline_observer_step(struct FlexsplineObserver *observer,
-                                               const struct FlexsplinePredictor *predictor,
-                                               const struct FlexsplineMeasured *measured);
-
-// Reports the estimates of an observer.
-enum FlexsplineStatus flexspline_observer_report(const struct FlexsplineObserver *observer,
-                                                 struct FlexsplineObserverReport *report);
-
-// Predicts the output some ticks from now, with the table as the output map of the two inertias. The work
-// grows with the ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
-enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predictor,
-                                         const struct FlexsplineObserver *observer,
-                                         const struct FlexsplineJoint *joint,
-                                         const struct FlexsplineStore *store,
-                                         const struct FlexsplineState *state,
-                                         const struct FlexsplineNow *now,
-                                         struct FlexsplineAhead *ahead);
-
-// Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
-// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to decide or too long, or the ticks too
-// few.
-enum FlexsplineStatus flexspline_start_up_init(struct FlexsplineStartUp *start_up,
-                                               const struct FlexsplineJoint *joint,
-                                               int64_t generator_counts,
-                                               const struct FlexsplineStartUpSettings *settings);
-
-// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the
-// last one what was found. Where something is implausible do not let the joint correct: its numbers are not what they
-// are taken for.
-enum FlexsplineStatus flexspline_start_up_step(struct FlexsplineStartUp *start_up,
-                                               const struct FlexsplineReadings *readings,
-                                               struct FlexsplineStartUpStep *step);
-
-// As `flexspline_slip_save`, with joint and table: the bytes are restored for the same ones alone.
-enum FlexsplineStatus flexspline_slip_save_for(const struct FlexsplineSlip *slip,
-                                               const struct FlexsplineJoint *joint,
-                                               const struct FlexsplineStore *store,
-                                               uint8_t *saved,
-                                               size_t saved_bytes,
-                                               size_t *written);
-
-// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table:
-// `FLEXSPLINE_STATUS_OTHER_TABLE` or `FLEXSPLINE_STATUS_OTHER_JOINT` (or other springs) if not.
-enum FlexsplineStatus flexspline_slip_restore_for(struct FlexsplineSlip *slip,
-                                                  const struct FlexsplineJoint *joint,
-                                                  const struct FlexsplineStore *store,
-                                                  const uint8_t *saved,
-                                                  size_t saved_bytes);
+// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way
+// of the target, and what a target asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and
+// generator times it goes to the motor's current; the load's inertia times `acceleration_rad_s2` over the ratio comes
+// on top. Both are NaN where the table gives nothing. Three inverse solutions.
+enum FlexsplineStatus flexspline_motion_ahead(const struct FlexsplineJoint *joint,
+                                              const struct FlexsplineStore *store,
+                                              int64_t target_counts,
+                                              float rate_rad_s,
+                                              float acceleration_rad_s2,
+                                              float torque_n_m,
+                                              float ahead_s,
+                                              struct FlexsplineMotionAhead *ahead);
 
 #ifdef __cplusplus
 }  // extern "C"
