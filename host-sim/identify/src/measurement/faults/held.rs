@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use super::lattice::lattice;
-use super::{Findings, leave_out, marked, runs, straight, throughout};
+use super::{Findings, leave_out_rows, runs, straight, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
@@ -104,9 +104,7 @@ fn check_angle(sessions: &mut [Session], channel: Quantity, gear: &Gear, finding
         let short = runs.iter().filter(|run| run.len() <= 2 * every);
         short.flat_map(|run| run.start + 1..run.end).collect::<Vec<usize>>()
     };
-    let drop: Vec<Vec<bool>> =
-        sessions.iter().zip(&of).map(|(session, runs)| marked(session.len(), repeats(runs))).collect();
-    leave_out(sessions, &drop);
+    leave_out_rows(sessions, of.iter().map(repeats));
 }
 
 fn check_torque(sessions: &mut [Session], findings: &mut Findings) {

@@ -112,6 +112,12 @@ fn leave_out(sessions: &mut [Session], drop: &[Vec<bool>]) {
     some.for_each(|(session, drop)| session.leave_out(drop));
 }
 
+/// Leaves out these rows, given session by session.
+fn leave_out_rows<I: IntoIterator<Item = usize>>(sessions: &mut [Session], rows: impl IntoIterator<Item = I>) {
+    let rows_of_one = sessions.iter_mut().zip(rows);
+    rows_of_one.for_each(|(session, rows)| session.leave_out(&marked(session.len(), rows)));
+}
+
 /// Rows of a series, as a flag for each.
 fn marked(count: usize, rows: impl IntoIterator<Item = usize>) -> Vec<bool> {
     let mut marked = vec![false; count];

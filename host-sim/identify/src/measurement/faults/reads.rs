@@ -16,7 +16,7 @@ use std::borrow::Cow;
 use super::outliers::repeat_with_position;
 use super::resolution::seen;
 use super::state::StateModel;
-use super::{ARCSEC, Findings, farthest, leave_out, marked, rows_of, throughout};
+use super::{ARCSEC, Findings, farthest, leave_out_rows, rows_of, throughout};
 use crate::least_squares::Normal;
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
@@ -448,10 +448,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     sessions.iter_mut().for_each(|session| session.unsure_s = unsure_s);
     weigh(sessions, &speed, noise.max(1e-3 * scatter), jitter_rows);
     if some_are_late {
-        let of =
-            |(session, late): (&Session, &Vec<(usize, f64)>)| marked(session.len(), late.iter().map(|late| late.0));
-        let drop: Vec<Vec<bool>> = sessions.iter().zip(&late).map(of).collect();
-        leave_out(sessions, &drop);
+        leave_out_rows(sessions, late.iter().map(|late| late.iter().map(|late| late.0)));
     }
 }
 

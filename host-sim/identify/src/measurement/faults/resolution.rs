@@ -34,8 +34,7 @@ const APART: [usize; 4] = [1, 2, 4, 8];
 
 /// Resolutions that show in the data, in rad at the output.
 pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
-    let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return Vec::new() };
-    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    let Some((session, noise)) = longest(sessions) else { return Vec::new() };
     let (generator, output) = (&session.generator_rad, session.output_rad(gear.ratio));
     let share = |rows: &[bool]| rows.iter().filter(|is| **is).count() as f64 / rows.len().max(1) as f64;
     // Round-off of an output that is the sum of two columns is no motion.
@@ -67,6 +66,12 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     found
 }
 
+/// The longest session, and the white noise of the error of all, rad.
+fn longest(sessions: &[Session]) -> Option<(&Session, f64)> {
+    let session = sessions.iter().max_by_key(|session| session.len())?;
+    Some((session, white_noise(sessions.iter().map(|session| session.error_rad.as_slice()))))
+}
+
 /// By how much the error differs, at the median, from one row to another where a channel has moved by a step or more,
 /// rad: at that distance of
 /// [`APART`] where it differs most.
@@ -87,8 +92,7 @@ pub(in crate::measurement) fn check(
     findings: &mut Findings,
 ) {
     let mut coarsest = 0.0f64;
-    let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return };
-    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    let Some((session, noise)) = longest(sessions) else { return };
     for (channel, step) in seen(sessions, gear, error_recorded) {
         if step < COARSE_RAD || noise > BLURRED * step {
             continue;
