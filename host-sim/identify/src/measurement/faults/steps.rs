@@ -111,30 +111,11 @@ fn with_columns<T>(steps: impl IntoIterator<Item = StepPlace>, more: &[Extra], t
     then(&all)
 }
 
-/// Where steps stay in the data, which may be those of an encoder or changes of flank.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::measurement) enum DoubtfulSteps {
-    /// None.
-    Nowhere,
-    /// Only such as stand where a session begins or ends: they may as well be between two.
-    AtTheEnds,
-    /// Some inside a session.
-    Inside,
-}
-
-/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives where steps are that are
-/// not distinguished.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> DoubtfulSteps {
-    let Some(FoundSteps { sure, doubtful, stays, .. }) = likelier(sessions, gear) else {
-        return DoubtfulSteps::Nowhere;
-    };
-    let where_doubtful = match doubtful.as_slice() {
-        [] => DoubtfulSteps::Nowhere,
-        steps if steps.iter().any(|(place, ..)| is_inside(&sessions[place.session], place.row)) => {
-            DoubtfulSteps::Inside
-        }
-        _ => DoubtfulSteps::AtTheEnds,
-    };
+/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Returns whether a step stays
+/// inside a session that may be one of an encoder or a change of flank; at its ends it may as well be between two.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> bool {
+    let Some(FoundSteps { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return false };
+    let some_inside = doubtful.iter().any(|(place, ..)| is_inside(&sessions[place.session], place.row));
     for (place, size, _) in &doubtful {
         let line = sessions[place.session].line[place.row];
         findings.notes.push(format!(
@@ -179,7 +160,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             rows.for_each(|(row, error)| *error -= size * place.reached(number, row));
         }
     }
-    where_doubtful
+    some_inside
 }
 
 /// Whether this many rows of its session are before and after a row that means over them are compared.
