@@ -41,7 +41,6 @@ pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 pub(crate) use unit::{Family, WrongReading};
 
 use faults::Findings;
-use faults::drift::Stretches;
 use log::{Log, LogFile};
 use raw::RawFile;
 
@@ -299,7 +298,7 @@ pub(crate) fn parse_at_least(
     }
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= own_zeros);
     if drifts {
-        faults::drift::check(&mut sessions, gear, Stretches::OfRows, &mut findings);
+        faults::drift::check(&mut sessions, gear, &mut findings);
     }
     faults::held::check(&mut sessions, gear, &mut findings);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
@@ -310,7 +309,7 @@ pub(crate) fn parse_at_least(
     let in_doubt = faults::steps::check(&mut sessions, gear, &mut findings);
     // Steps that stay in the data look like drift; what may be one between two sessions may be drift as well.
     if !in_doubt && findings.tooth_steps.is_empty() && !drifts {
-        faults::drift::check(&mut sessions, gear, Stretches::OfTime, &mut findings);
+        faults::drift::check(&mut sessions, gear, &mut findings);
     }
     let Findings { mut faults, tooth_steps, notes } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));

@@ -70,16 +70,9 @@ const GAP_SHARE: f64 = 2.0;
 /// Rows of which the median is a level. *Guess*: it has a third of the noise of a row.
 const LEVEL_ROWS: usize = 12;
 
-/// How a recording is cut into stretches: evenly in time, or in rows, where long breaks would leave few of them.
-#[derive(Clone, Copy, PartialEq)]
-pub(in crate::measurement) enum Stretches {
-    OfTime,
-    OfRows,
-}
-
 /// Finds a linear drift over the whole recording, names it and takes it out.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, cut: Stretches, findings: &mut Findings) {
-    let Some((per_s, from_s, std)) = slope(sessions, gear, cut) else { return };
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
+    let Some((per_s, from_s, std)) = slope(sessions, gear) else { return };
     let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
     let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
     let total = per_s * (last - first);
@@ -106,14 +99,14 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, cut: 
 
 /// Whether there is a drift of about so much, rad/s.
 pub(in crate::measurement) fn confirms(sessions: &[Session], gear: &Gear, per_s: f64) -> bool {
-    slope(sessions, gear, Stretches::OfRows).is_some_and(|(found, ..)| (found - per_s).abs() < ABOUT * per_s.abs())
+    slope(sessions, gear).is_some_and(|(found, ..)| (found - per_s).abs() < ABOUT * per_s.abs())
 }
 
 /// Two rates of drift are one if they differ by less than this share. *Guess*.
 const ABOUT: f64 = 0.2;
 
 /// Drift, rad/s, the time at which it is taken as zero (the middle), and its standard deviation.
-fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64, f64)> {
+fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     if sessions.iter().any(|session| session.time_s.is_none() || session.len() < 2) {
         return None;
     }
@@ -167,30 +160,21 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
     if confused && (warms_with_time(sessions, &tau) || drift.abs() < BEYOND_CONFUSION * formal) {
         return None;
     }
-    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain. A
-    // bench that rests for longer than it runs fills few stretches of time: then they are of rows, and what each
-    // session says by itself must not contradict.
+    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain.
     let lefts: Vec<Vec<(f64, f64)>> = (0..sessions.len())
         .map(|s| {
             let left = state.left(&fit, s, &all);
             left.iter().enumerate().map(|(row, left)| (tau(s, row), left + drift * tau(s, row))).collect()
         })
         .collect();
-    let mut points: Vec<(f64, f64)> = if cut == Stretches::OfTime { of_time(&lefts) } else { Vec::new() };
-    if points.len() < FEWEST_STRETCHES {
-        if cut == Stretches::OfTime && !alike_in_sessions(&lefts, drift) {
-            return None;
-        }
-        points = of_rows_alone(&lefts);
-    }
-    if confused && !alike_in_sessions(&lefts, drift) {
+    if confused && (lefts.len() <= FEWEST_GAPS || !on_the_line(&lefts, drift)) {
         return None;
     }
     // A zero that is set anew in each session may lie anywhere, also about a line; within the sessions it stands then.
     if (2..=MOST_ZEROS).contains(&lefts.len()) && !goes_on_within(&state, &all, place, drift, &lefts) {
         return None;
     }
-    let (trend, std) = line(&points)?;
+    let (trend, std) = line(&of_stretches(&lefts))?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
     let steady = (trend - drift).abs() < 0.5 * drift.abs();
     (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
@@ -209,19 +193,8 @@ fn warms_with_time(sessions: &[Session], tau: Extra) -> bool {
 /// A time in units of the recording, from -1 to 1, and what is left of the error there, rad.
 type Point = (f64, f64);
 
-/// Medians of stretches of time with a few rows at least.
-fn of_time(lefts: &[Vec<Point>]) -> Vec<Point> {
-    let mut stretches: Vec<Vec<f64>> = vec![Vec::new(); STRETCHES];
-    for (tau, left) in lefts.iter().flatten() {
-        stretches[(((tau + 1.0) / 2.0 * STRETCHES as f64) as usize).min(STRETCHES - 1)].push(*left);
-    }
-    let middle = |place: usize| (place as f64 + 0.5) / STRETCHES as f64 * 2.0 - 1.0;
-    let some = stretches.iter_mut().enumerate().filter(|(_, left)| left.len() >= STRETCH_ROWS);
-    some.map(|(place, left)| (middle(place), median_of(left))).collect()
-}
-
 /// Medians of stretches of rows, none over a break.
-fn of_rows_alone(lefts: &[Vec<Point>]) -> Vec<Point> {
+fn of_stretches(lefts: &[Vec<Point>]) -> Vec<Point> {
     let rows = lefts.iter().map(Vec::len).sum();
     let stretches = |left: &Vec<Point>| {
         let long = left.len().div_ceil((STRETCHES * left.len()).div_ceil(rows).max(1)).max(1);
@@ -234,13 +207,6 @@ fn of_rows_alone(lefts: &[Vec<Point>]) -> Vec<Point> {
 fn middle_of(part: &[Point]) -> Point {
     let tau = part.iter().map(|of| of.0).sum::<f64>() / part.len() as f64;
     (tau, median_of(&mut part.iter().map(|of| of.1).collect::<Vec<f64>>()))
-}
-
-/// Whether sessions lie on a line of this slope, and no session by itself has another slope.
-fn alike_in_sessions(lefts: &[Vec<Point>], drift: f64) -> bool {
-    let (within, std) = within_sessions(lefts, drift);
-    let contradicted = (within - drift).abs() > WITHIN * drift.abs() + CERTAIN * std;
-    lefts.len() > FEWEST_GAPS && on_the_line(lefts, drift) && !contradicted
 }
 
 /// Whether the zero moves within sessions, a zero of each free, as it does over all of them; where that does not show,
@@ -265,21 +231,6 @@ fn on_the_line(lefts: &[Vec<Point>], drift: f64) -> bool {
     let zero = median_of(&mut middles.iter().map(|of| of.1 - drift * of.0).collect::<Vec<f64>>());
     let off = |of: &Point| (of.1 - drift * of.0 - zero).abs();
     middles.iter().all(|of| off(of) < OFF_THE_LINE * (drift * (high.0 - low.0)).abs())
-}
-
-/// The slope within sessions, all together, from the medians of their stretches, and its standard deviation about
-/// `drift`.
-fn within_sessions(lefts: &[Vec<Point>], drift: f64) -> (f64, f64) {
-    let centred = |left: &Vec<Point>| -> Vec<Point> {
-        let parts: Vec<Point> = left.chunks(left.len().div_ceil(STRETCHES).max(1)).map(middle_of).collect();
-        let count = parts.len() as f64;
-        let mean = parts.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / count, m.1 + p.1 / count));
-        parts.into_iter().map(|of| (of.0 - mean.0, of.1 - mean.1)).collect()
-    };
-    let centred: Vec<Point> = lefts.iter().flat_map(centred).collect();
-    let LineFit { slope, square, .. } = LineFit::of(&centred);
-    let left_over = centred.iter().map(|(x, y)| (y - drift * x).powi(2)).sum::<f64>();
-    (slope, (left_over / centred.len().max(1) as f64 / square.max(1e-300)).sqrt())
 }
 
 /// The error from this row on, rad: a median of a few rows.
@@ -392,7 +343,7 @@ mod tests {
 
     fn found(mut sessions: Vec<Session>) -> Option<f64> {
         let mut findings = Findings::default();
-        check(&mut sessions, &Gear::of_ratio(100.0), Stretches::OfTime, &mut findings);
+        check(&mut sessions, &Gear::of_ratio(100.0), &mut findings);
         findings.faults.first().and_then(|fault| fault.measures.arcsec_per_hour)
     }
 
