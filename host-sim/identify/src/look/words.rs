@@ -63,64 +63,52 @@ pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
     if any(&ASIDE) || is("following") {
         return Said { aside: true, joint, ..Said::default() };
     }
-    let by_unit = kind_of_unit(name, unit);
-    let angle = by_unit.map_or_else(|| any(&ANGLES), |kind| kind == UnitKind::Angle);
+    let by_unit = role_by_unit(name, unit);
+    let angle = by_unit.map_or_else(|| any(&ANGLES), |role| role == Role::Unknown);
     let fits = |role: Role| match by_unit {
-        Some(UnitKind::Angle) => matches!(role, Role::Error | Role::Orientation | Role::Generator | Role::Output),
+        Some(Role::Unknown) => matches!(role, Role::Error | Role::Orientation | Role::Generator | Role::Output),
         // A drive's "current position" is not one in amperes.
         None => !(role == Role::Current && angle),
         _ => true,
     };
     let by_words = WORDS.iter().find(|(role, known)| fits(*role) && any(known)).map(|(role, _)| *role);
     let role = match by_unit {
-        Some(UnitKind::Speed) => Some(Role::Speed),
-        Some(UnitKind::Temperature) => Some(Role::Temperature),
-        Some(UnitKind::Torque) => Some(Role::Torque),
-        Some(UnitKind::Current) => by_words.filter(|role| *role == Role::Torque).or(Some(Role::Current)),
-        Some(UnitKind::Time) => by_words.or(Some(Role::Time)),
-        Some(UnitKind::Angle) | None => by_words,
+        Some(Role::Current) => by_words.filter(|role| *role == Role::Torque).or(Some(Role::Current)),
+        Some(Role::Time) => by_words.or(Some(Role::Time)),
+        Some(Role::Unknown) | None => by_words,
+        certain => certain,
     };
     let angle = angle && role.is_none_or(|role| role.is_angle());
     Said { role, commanded: any(&COMMANDED), angle, aside: false, joint }
 }
 
-/// The quantity of a unit, as far as a role follows from it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum UnitKind {
-    Angle,
-    Torque,
-    Current,
-    Speed,
-    Temperature,
-    Time,
-}
-
-/// The quantity of the unit in a line of its own, in brackets, or at the end of a name.
-fn kind_of_unit(name: &str, line: Option<&str>) -> Option<UnitKind> {
+/// The role by the unit in a line of its own, in brackets, or at the end of a name; [`Role::Unknown`] for an angle, of
+/// whatever shaft.
+fn role_by_unit(name: &str, line: Option<&str>) -> Option<Role> {
     let Some(text) = line.or_else(|| Unit::bracketed(name)) else {
         // A single letter at the end of a name is a letter more often than a unit: phase_A, sensor_C.
         let unit = Unit::in_name(name).filter(|unit| matches!(unit.family(), Family::Angle | Family::Torque));
-        return unit.and_then(kind).filter(|kind| *kind != UnitKind::Current || name.ends_with("_mA"));
+        return unit.and_then(role_of).filter(|role| *role != Role::Current || name.ends_with("_mA"));
     };
     let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
     let lower = text.to_lowercase();
     let per_time = ["/s", "/min", "/sec", "/h", "s^-1", "s-1"].iter().any(|end| lower.contains(end));
     if per_time || ["rpm", "1/min", "u/min", "min-1"].contains(&lower.as_str()) {
-        return Some(UnitKind::Speed);
+        return Some(Role::Speed);
     }
-    Unit::in_brackets(text).and_then(kind)
+    Unit::in_brackets(text).and_then(role_of)
 }
 
-fn kind(unit: Unit) -> Option<UnitKind> {
+fn role_of(unit: Unit) -> Option<Role> {
     match unit {
-        Unit::Ampere | Unit::Milliampere => Some(UnitKind::Current),
+        Unit::Ampere | Unit::Milliampere => Some(Role::Current),
         // A transducer of anything.
         Unit::Volt => None,
         unit => Some(match unit.family() {
-            Family::Angle => UnitKind::Angle,
-            Family::Torque => UnitKind::Torque,
-            Family::Temperature => UnitKind::Temperature,
-            Family::Time => UnitKind::Time,
+            Family::Angle => Role::Unknown,
+            Family::Torque => Role::Torque,
+            Family::Temperature => Role::Temperature,
+            Family::Time => Role::Time,
         }),
     }
 }

@@ -128,7 +128,7 @@ pub(super) fn leave_out<T>(values: &mut Vec<T>, drop: &[bool]) {
 /// A file as it was read.
 pub(super) struct LogFile {
     pub log: Log,
-    /// The columns in use.
+    /// The columns in use; none of a guide log, whose numbers need no mapping.
     pub columns: Vec<MappedColumn>,
     /// Whether each session has a zero of its own.
     pub own_zeros: bool,
@@ -244,7 +244,7 @@ fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64, findings: &mut Finding
         return Err(TableProblem { line: 1, what });
     }
     findings.notes.extend(notes);
-    Ok(LogFile { log, columns: phd2::columns(), own_zeros: true })
+    Ok(LogFile { log, columns: Vec::new(), own_zeros: true })
 }
 
 /// Refuses rows that end before a column in use, or have more fields than names.

@@ -305,21 +305,10 @@ pub(crate) enum WrongReading {
 
 /// A number at the beginning of a text, such as `1e-3` or `2^24`, and what follows it.
 fn leading_number(text: &str) -> Option<(f64, &str)> {
+    // The longest beginning that is one, of what numbers are written with: `inf` and `nan` are words.
     let plain = |text: &str| {
-        let mut end = 0;
-        let mut exponent = false;
-        let bytes = text.as_bytes();
-        while let Some(byte) = bytes.get(end) {
-            let digit = byte.is_ascii_digit() || *byte == b'.';
-            let begins = !exponent && end > 0 && matches!(byte, b'e' | b'E');
-            let sign = matches!(byte, b'+' | b'-') && (end == 0 || matches!(bytes[end - 1], b'e' | b'E'));
-            if !(digit || begins || sign) {
-                break;
-            }
-            exponent |= begins;
-            end += 1;
-        }
-        text[..end].parse::<f64>().ok().map(|number| (number, end))
+        let long = text.bytes().take_while(|byte| b"0123456789.+-eE".contains(byte)).count();
+        (1..=long).rev().find_map(|end| Some((text[..end].parse::<f64>().ok()?, end)))
     };
     let (base, end) = plain(text)?;
     let rest = &text[end..];

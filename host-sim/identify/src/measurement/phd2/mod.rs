@@ -20,7 +20,7 @@ mod text;
 use std::f64::consts::TAU;
 use std::io::{BufRead, BufReader, Read};
 
-use super::columns::{MappedColumn, Quantity, Reading, Unit};
+use super::columns::Quantity;
 use super::log::Log;
 use super::reader::clock;
 use axis::Pointing;
@@ -269,17 +269,6 @@ fn of_sections(sections: &[GuideSection], stands: &[f64], ratio: f64, further: V
     log.put(Quantity::Generator, column(&|_, stands, frame| ratio * TAU * (stands + frame.time_s / SIDEREAL_DAY_S)));
     log.put(Quantity::Error, column(&|_, _, frame| (lags * frame.distance - frame.sent) / ARCSEC_PER_RAD));
     (log, notes)
-}
-
-/// The columns of such a log as if they had been mapped.
-pub(super) fn columns() -> Vec<MappedColumn> {
-    let column = |(place, (quantity, name, unit)): (usize, (Quantity, usize, Unit))| {
-        let name = COLUMNS[name].to_owned();
-        MappedColumn { quantity, name, place, unit, reading: Reading::of(unit), said: true }
-    };
-    let columns =
-        [(Quantity::Time, 0, Unit::Second), (Quantity::Generator, 0, Unit::Radian), (Quantity::Error, 2, Unit::Radian)];
-    columns.into_iter().enumerate().map(column).collect()
 }
 
 #[cfg(test)]

@@ -46,28 +46,27 @@ impl Separator {
     const ALL: [Separator; 5] =
         [Separator::Comma, Separator::Semicolon, Separator::Tab, Separator::Bar, Separator::Blanks];
 
+    /// Its name, and the byte between two fields; of blanks the tab that [`with_tabs`] puts in their place.
+    const fn spec(self) -> (&'static str, u8) {
+        match self {
+            Separator::Comma => ("comma", b','),
+            Separator::Semicolon => ("semicolon", b';'),
+            Separator::Tab => ("tab", b'\t'),
+            Separator::Bar => ("bar", b'|'),
+            Separator::Blanks => ("blanks", b'\t'),
+        }
+    }
+
     /// Its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Separator::Comma => "comma",
-            Separator::Semicolon => "semicolon",
-            Separator::Tab => "tab",
-            Separator::Bar => "bar",
-            Separator::Blanks => "blanks",
-        }
+        self.spec().0
     }
 
     /// Records of a text; of one with [`Separator::Blanks`] as [`with_tabs`] writes it.
     pub(super) fn records(self, text: &[u8]) -> csv::Reader<&[u8]> {
-        let byte = match self {
-            Separator::Comma => b',',
-            Separator::Semicolon => b';',
-            Separator::Tab | Separator::Blanks => b'\t',
-            Separator::Bar => b'|',
-        };
         let mut form = csv::ReaderBuilder::new();
-        form.delimiter(byte).has_headers(false).flexible(true).from_reader(text)
+        form.delimiter(self.spec().1).has_headers(false).flexible(true).from_reader(text)
     }
 }
 
