@@ -302,8 +302,8 @@ pub(super) fn predicted_by_table(rows: &Rows, torque: &[f64], table: &Table<'_>)
 }
 
 fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec<bool> {
-    // Where hardly any load says which flank carries, the motion does, or nothing says it but at the beginning. Sessions
-    // without a load are set aside as a whole, unless too little is left then.
+    // Where hardly any load says which flank carries, the motion does, or nothing says it but at the beginning.
+    // Sessions without a load are set aside as a whole, unless too little is left then.
     let ways: [&dyn Fn() -> Option<Vec<bool>>; 4] = [
         &|| Some(uncertain_by_load(rows, nominal, flank)),
         &|| (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal)),

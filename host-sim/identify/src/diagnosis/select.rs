@@ -238,8 +238,8 @@ fn tried(
     laws.par_iter().with_max_len(1).map(of).collect()
 }
 
-/// The strongest laws (`most` of them) at the best of the places tried, best evidence first, not refined; and the others
-/// with the gates that they came to.
+/// The strongest laws (`most` of them) at the best of the places tried, best evidence first, not refined; and the
+/// others with the gates that they came to.
 fn best_tried<'l>(
     scaffold: &Scaffold<'_, '_, '_, 'l>,
     laws: &[&'l Law],
