@@ -217,7 +217,7 @@ pub struct Sealed<T> {
 }
 
 impl<T> Sealed<T> {
-    /// A value with its sum, for constants: that of all its words ([`sum_of`]).
+    /// A value with its sum, for constants: that of all its words.
     pub const fn of(kept: T, sum: u64) -> Self {
         Self { kept, sums: pair(sum) }
     }

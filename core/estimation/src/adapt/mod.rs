@@ -84,7 +84,7 @@ pub struct Seen<'s> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted {
     /// For [`Input`](flexspline::Input) of the next tick. Where learning is lost it adds nothing, with all that
-    /// coefficients can have added as its uncertainty, until [`AdaptState::set_learning`] is called or the adapter is
+    /// coefficients can have added as its uncertainty, until `AdaptState::set_learning` is called or the adapter is
     /// made anew.
     pub adjustment: Adjustment,
     /// Standard deviation of what it adds to the error, rad: no bound, so the adjustment does not have it. Where

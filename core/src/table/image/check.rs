@@ -818,7 +818,7 @@ impl<'a> Table<'a> {
     /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
     /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; torque intervals
     /// that meet at their nodes; wind-up that grows with the load on both flanks, and no faster than a drive can; the
-    /// largest error the table can give within its stated limit and [`MAX_ERROR_RAD`]; `|ratio·de/dψ| < 1` everywhere,
+    /// largest error the table can give within its stated limit and `MAX_ERROR_RAD`; `|ratio·de/dψ| < 1` everywhere,
     /// so that the inverse exists, and how it converges; periodic parts closed at the wrap; every offset, unit and
     /// bound that follows from other numbers.
     ///

@@ -162,7 +162,7 @@ impl<'a> Table<'a> {
         self.image
     }
 
-    /// Number of [`PAGE_BYTES`] pages in the body.
+    /// Number of `PAGE_BYTES` pages in the body.
     #[must_use]
     pub const fn page_count(&self) -> usize {
         self.body_bytes.div_ceil(PAGE_BYTES)
