@@ -13,9 +13,9 @@
 //! on. A slow group in the background therefore runs with the interrupt of the tick held off, or in the same one. What
 //! is only read (`const`) may be shared while nobody writes.
 //!
-//! Not to be called from Rust, and private for that reason. The only `unsafe` of the crate. What it relies on, and what
-//! C cannot be kept from breaking: a pointer that is not null and is aligned points to an object of its type, and
-//! images have the length given.
+//! Not to be called from Rust, which has the crates behind it. The only crate of the core with `unsafe`. What it relies
+//! on, and what C cannot be kept from breaking: a pointer that is not null and is aligned points to an object of its
+//! type, and images have the length given.
 #![no_std]
 #![allow(unsafe_code, clippy::not_unsafe_ptr_arg_deref)] // As C calls them.
 #![cfg_attr(
