@@ -81,8 +81,7 @@ impl<'a> Problem<'a> {
         let Fineness { stride, noise, worth } = fineness;
         let whitener = Whitener::new(on.rows, uncertain, stride, noise);
         let grain = Grain::new(averaged, &whitener);
-        let rows: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
-        let data = whitener.average(&rows);
+        let data = whitener.average(&on.left(&[]));
         let data_white = Set::new(vec![whitener.whiten_averaged(&data)]);
         let base: Vec<Vec<f64>> = on.base.floating.iter().map(|f| whitener.average(&f.values)).collect();
         let base_white = Set::new(whitener.whiten_each(&base));
