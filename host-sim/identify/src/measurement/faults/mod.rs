@@ -114,8 +114,8 @@ fn leave_out(sessions: &mut [Session], drop: &[Vec<bool>]) {
 
 /// Leaves out these rows, given session by session.
 fn leave_out_rows<I: IntoIterator<Item = usize>>(sessions: &mut [Session], rows: impl IntoIterator<Item = I>) {
-    let rows_of_one = sessions.iter_mut().zip(rows);
-    rows_of_one.for_each(|(session, rows)| session.leave_out(&marked(session.len(), rows)));
+    let drop: Vec<Vec<bool>> = sessions.iter().zip(rows).map(|(session, rows)| marked(session.len(), rows)).collect();
+    leave_out(sessions, &drop);
 }
 
 /// Rows of a series, as a flag for each.
