@@ -6,8 +6,7 @@ use std::{env, fs};
 
 use flexspline::{Direction, Drive, FixedMember, GeneratorKind};
 use flexspline_estimation::{Inertias, Noise, TwoMassObserver};
-use flexspline_make::Provenance;
-use flexspline_make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+use flexspline_make::{Harmonics, MissingDirection, Plan, Provenance, Sample, Workspace, make_image};
 
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets it"));

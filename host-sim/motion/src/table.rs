@@ -4,9 +4,8 @@
 use core::f64::consts::TAU;
 
 use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, Table};
-use flexspline_make::Provenance;
 use flexspline_make::{
-    Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, ProjectError, Sample, Workspace, make_image,
+    Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, ProjectError, Provenance, Sample, Workspace, make_image,
 };
 
 use super::gear::{Gear, GearLine, SampledSpring, Spring};

@@ -4,8 +4,9 @@
 //! laid: which nodes, which harmonics the samples can distinguish, and where the table came from.
 
 use flexspline::{FixedMember, Table};
-use flexspline_make::{Harmonics, MissingDirection, Plan, ProjectError, Sample, Workspace, make_image};
-use flexspline_make::{MAX_RIPPLE_NODES, Provenance};
+use flexspline_make::{
+    Harmonics, MAX_RIPPLE_NODES, MissingDirection, Plan, ProjectError, Provenance, Sample, Workspace, make_image,
+};
 use thiserror::Error;
 
 use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};

@@ -6,8 +6,7 @@
 //! reads the trial table as will read the final one.
 
 use flexspline::{Direction, GeneratorAngle, ImageError, Table};
-use flexspline_make::ProjectError;
-use flexspline_make::WriteError;
+use flexspline_make::{ProjectError, WriteError};
 
 use super::project::{TableError, trial_table};
 use rayon::prelude::*;

@@ -25,8 +25,7 @@ mod together;
 mod zero;
 
 use flexspline::{ImageError, Table};
-use flexspline_make::ProjectError;
-use flexspline_make::WriteError;
+use flexspline_make::{ProjectError, WriteError};
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
