@@ -37,6 +37,10 @@ impl Fixed {
     }
 }
 
+/// The farthest that a drive winds up, rad: torques beyond are in another unit. *Source*: 69 arcmin at the ratcheting
+/// torque of the softest drive of the catalogue (CSG-14-80), the largest of 44.
+const FARTHEST_WIND_UP_RAD: f64 = 0.02;
+
 /// Tooth counts of a strain wave drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Teeth {
@@ -141,10 +145,12 @@ impl Nominal {
     /// The gear, for the reader of data.
     #[must_use]
     pub fn gear(&self) -> Gear {
-        match self.teeth {
+        let gear = match self.teeth {
             Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == Fixed::Flexspline),
             None => Gear::of_ratio(self.ratio),
-        }
+        };
+        let stiffest = self.stiffness.iter().fold(f64::INFINITY, |_, [_, stiffness]| *stiffness);
+        Gear { plausible_torque_n_m: (stiffest * FARTHEST_WIND_UP_RAD).min(gear.plausible_torque_n_m), ..gear }
     }
 
     /// Wind-up under a torque, arcsec, of the sign of the torque.

@@ -322,13 +322,20 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
     for file in files {
         let (mut rows, refused) = ReadRows::of_raw(file, &columns, ratio);
         notes.extend(rows.notes.drain(..).map(|note| of_file(file, note)));
-        read.push(rows);
+        if rows.milliseconds {
+            // The refusal holds both readings; the mapping holds the one that fits the rows.
+            let time = guesses.iter_mut().filter(|guess| guess.used && guess.role == Role::Time);
+            time.for_each(|time| time.unit = Some(Unit::Millisecond));
+            columns_option = option(&guesses, &names, &mut notes);
+        }
         // A cell in use that is no number, or a row of another width, is for people to mend.
         if let Some(refused) = refused {
             let then = columns_option.as_ref().map_or(String::new(), |columns| format!("; then --columns {columns}"));
-            notes.push(format!("{refused}: mend it or take it out{then}"));
+            let mend = if rows.milliseconds { "" } else { ": mend it or take it out" };
+            notes.push(format!("{refused}{mend}{then}"));
             columns_option = None;
         }
+        read.push(rows);
     }
     let (time, period_s) = clock(&read);
     Ok(Looked {
@@ -651,12 +658,23 @@ fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Optio
     if has(Role::Generator) && (has(Role::Output) || has(Role::Error)) {
         return Some(entries(&|_| true));
     }
-    let what = match (has(Role::Generator), has(Role::Output) || has(Role::Error)) {
-        (true, false) => "which column is the output (or the error)",
-        (false, true) => "which column is the generator",
-        _ => "which columns are generator and output",
+    // The column of a role by its name, in use or not.
+    let named = |role: Role| guesses.iter().zip(names).find(|(guess, _)| guess.role == role && guess.moves());
+    let entry = |role: Role| {
+        let unit = named(role).filter(|(guess, _)| guess.used).and_then(|(guess, _)| guess.written());
+        let name = named(role).map_or("NAME", |(_, name)| name);
+        format!("{name}:{}", unit.unwrap_or_else(|| "UNIT".to_owned()))
     };
-    notes.push(format!("{what} is not known: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
+    let what = match (has(Role::Generator), has(Role::Output) || has(Role::Error)) {
+        (true, false) if named(Role::Output).is_some() => {
+            "the column that is called an output does not follow the generator as one, in its unit"
+        }
+        (true, false) => "which column is the output (or the error) is not known",
+        (false, true) => "which column is the generator is not known",
+        _ => "which columns are generator and output is not known",
+    };
+    let (generator, output) = (entry(Role::Generator), entry(Role::Output));
+    notes.push(format!("{what}: name them, --columns generator={generator},output={output}"));
     None
 }
 

@@ -729,3 +729,37 @@ fn counts_that_the_file_does_not_say_are_asked() {
     let due = "column 4, torque: found the unit \"Nmx\", allowed: N.m, N.cm, N.mm, ";
     assert!(looked.notes.iter().any(|note| note.starts_with(due)), "{}", text(&looked));
 }
+
+#[test]
+fn a_unit_that_the_rows_contradict_is_asked_with_the_columns_by_their_names() {
+    const NAMES: &str = "time_s,generator_rad,output_rad,torque_n_m\n";
+    let degrees = file(NAMES, ",", |t, k| with(plain(t, k), 2, format!("{:.7}", t.output_rad[k].to_degrees())));
+    let looked = looked_at(degrees.as_bytes()).unwrap();
+    assert_eq!(looked.columns_option, None);
+    let asked = "--columns generator=generator_rad:rad,output=output_rad:UNIT";
+    assert!(looked.notes.iter().any(|note| note.ends_with(asked)), "{:?}", looked.notes);
+    // A motor to and fro within minutes, its milliseconds called seconds.
+    let mut creeps = NAMES.to_owned();
+    for k in 0..ROWS {
+        let psi = 100.0 * (k as f64 / 200.0).sin();
+        let _ = writeln!(creeps, "{},{psi:.6},{:.8},0", 20 * k, psi / RATIO + 20.0 * ARCSEC * (2.0 * psi).sin());
+    }
+    let looked = looked_at(creeps.as_bytes()).unwrap();
+    assert_eq!(looked.columns_option, None);
+    let note = looked.notes.iter().find(|note| note.contains("milliseconds rather than seconds")).unwrap();
+    assert!(note.contains("; then --columns time=time_s:ms,generator=generator_rad:rad"), "{note}");
+    assert!(!note.contains("time=time_s:s,"), "{note}");
+}
+
+#[test]
+fn a_line_of_names_begins_a_session_where_no_time_says_when() {
+    let parts = |names: &str, from: usize| {
+        let rows = file(names, ",", |t, k| plain(t, k)[from..].to_vec());
+        let (header, rows) = rows.split_once('\n').unwrap();
+        let half = rows.match_indices('\n').nth(ROWS / 2).unwrap().0 + 1;
+        format!("{header}\n{}{header}\n{}", &rows[..half], &rows[half..])
+    };
+    let sessions = |text: String| read(text.as_bytes(), "").unwrap().sessions.len();
+    assert_eq!(sessions(parts("generator_rad,output_rad,torque_n_m\n", 1)), 2);
+    assert_eq!(sessions(parts("time_s,generator_rad,output_rad,torque_n_m\n", 0)), 1);
+}

@@ -1,6 +1,6 @@
 //! Properties of a drive that the reader needs.
 
-/// Ratio, tooth pitch and largest torque of a drive.
+/// Ratio, tooth pitch and largest plausible torque of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gear {
     /// Turns of the generator for one of the output, negative if the output turns against it.
@@ -10,8 +10,8 @@ pub struct Gear {
     pub tooth_pitch_rad: Option<f64>,
     /// Ratio with the other wheel fixed; `None` for a gear without known teeth.
     pub other_wheel_ratio: Option<f64>,
-    /// Torques beyond this, N·m, are in another unit.
-    pub largest_torque_n_m: f64,
+    /// Torques beyond this, N·m, are in another unit, unless the mapping says theirs.
+    pub plausible_torque_n_m: f64,
 }
 
 impl Gear {
@@ -21,7 +21,7 @@ impl Gear {
 
     /// A gear of which the ratio is known.
     pub fn of_ratio(ratio: f64) -> Gear {
-        Gear { ratio, tooth_pitch_rad: None, other_wheel_ratio: None, largest_torque_n_m: Gear::LARGEST_TORQUE_N_M }
+        Gear { ratio, tooth_pitch_rad: None, other_wheel_ratio: None, plausible_torque_n_m: Gear::LARGEST_TORQUE_N_M }
     }
 
     /// A strain wave gear by its teeth; the flexspline is fixed, or the circular spline.

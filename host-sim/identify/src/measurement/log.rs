@@ -16,6 +16,10 @@ use flexspline_base::csv_rows::TableProblem;
 /// Fewest rows that say anything about noise or an order. *Guess*: fewer give no standard deviation to speak of.
 pub const FEWEST_ROWS: usize = 16;
 
+/// A line of names begins a session of rows without a time where there are this many rows to each such line. *Guess*:
+/// a logger that repeats its names for whoever reads along does so once a page.
+const ROWS_OF_A_PART: usize = 200;
+
 /// Measured data that cannot be used. Its text names file, line where there is one, what was found and what is allowed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{file}{}: {what}", .line.map_or_else(String::new, |line| format!(":{line}")))]
@@ -220,6 +224,13 @@ pub(crate) fn of_columns(
         return Err(refuse(format!(
             "{rows} after the header; at least {fewest} are needed: a log has a line for each instant of a motion"
         )));
+    }
+    if log.get(Quantity::Time).is_none() && log.len() >= ROWS_OF_A_PART * read.restarts.len() {
+        // Nothing else says where one recording ends and the next begins.
+        let mut begins: Vec<usize> =
+            read.restarts.iter().map(|names| log.line.partition_point(|line| line < names)).collect();
+        begins.dedup();
+        log.begin_sessions(&begins);
     }
     if let Some(rate_hz) = rate_hz {
         if log.get(Quantity::Time).is_some() {

@@ -335,6 +335,8 @@ pub(crate) struct ReadRows {
     pub(crate) stamps_s: Vec<f64>,
     /// Sentences on what was converted, mended or left out.
     pub(crate) notes: Vec<String>,
+    /// Whether they are refused because their times, read as seconds, are milliseconds.
+    pub(crate) milliseconds: bool,
 }
 
 impl ReadRows {
@@ -348,7 +350,8 @@ impl ReadRows {
         let cells = |column: &MappedColumn| file.columns.cells[column.place].clone();
         let read = file.columns.with_cells(columns.iter().map(cells).collect());
         let mut findings = Findings::default();
-        let mut rows = ReadRows { log: Log::default(), stamps_s: Vec::new(), notes: Vec::new() };
+        let (log, stamps_s, notes) = (Log::default(), Vec::new(), Vec::new());
+        let mut rows = ReadRows { log, stamps_s, notes, milliseconds: false };
         let at = |problem: TableProblem| MeasuredError::at(&file.file, problem);
         let made = log::of_columns(&file.sheet.layout, read, columns, None, 0, &mut findings);
         let (mut log, refused) = match made {
@@ -363,6 +366,7 @@ impl ReadRows {
         rows.log = log;
         rows.notes = findings.notes;
         rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
+        rows.milliseconds = matches!(ordered, Err(Refusal::Milliseconds { .. }));
         (rows, refused.map(at).or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why))))
     }
 

@@ -91,6 +91,9 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     });
 }
 
+/// Sessions or turns that a message lists; of more it lists the first ones.
+const LISTED: usize = 6;
+
 /// A row, and the turns by which the generator's angle is off from it on.
 type Turns = (usize, f64);
 
@@ -172,7 +175,7 @@ pub(in crate::measurement) fn between_sessions(
             ));
         }
     }
-    let list: Vec<String> = restarts.iter().take(6).map(|(_, turns)| format!("{turns:+.0}")).collect();
+    let list: Vec<String> = restarts.iter().take(LISTED).map(|(_, turns)| format!("{turns:+.0}")).collect();
     take_turns_out(log, &restarts, FaultName::CounterRestart, gear, findings, |_| {
         format!(
             "the generator's counter begins anew before {} of {} sessions, by {}{} turns of the motor: they are put \
@@ -186,11 +189,15 @@ pub(in crate::measurement) fn between_sessions(
     let largest_arcsec = farthest(others.iter().map(|(_, jump)| *jump)) / ARCSEC;
     let fault = log.fault(FaultName::PositionJump, others.iter().map(|(row, _)| *row));
     let fault = fault.map(|fault| Fault { size_arcsec: Some(largest_arcsec), ..fault });
-    findings.add(fault, None::<Quantity>, Treatment::Repaired, |fault| {
+    findings.add(fault, None::<Quantity>, Treatment::Repaired, |_| {
+        let numbers: Vec<String> =
+            taken_off.iter().take(LISTED).map(|(session, _)| (session + 1).to_string()).collect();
         format!(
-            "the zero of {} sessions is another one, by up to {largest_arcsec:.0} arcsec, which is no whole number of \
-             motor turns or tooth pitches: the zero of each is fitted on its own",
-            fault.rows
+            "the zero of {} sessions ({}{}) is another one, by up to {largest_arcsec:.0} arcsec, which is no whole \
+             number of motor turns or tooth pitches: the zero of each is fitted on its own",
+            taken_off.len(),
+            numbers.join(", "),
+            if taken_off.len() > LISTED { ", …" } else { "" }
         )
     });
     log.get_mut(Quantity::Output).into_iter().for_each(|output| add_steps(output, &others, -1.0));
@@ -284,6 +291,7 @@ mod tests {
         assert!(found(&mut log(true, 0.0, TAU / 200.0)).0.is_empty(), "one pitch");
         let (faults, others) = found(&mut log(true, 0.0, 0.0123));
         assert_eq!((faults.len(), faults[0].name, others.len(), others[0].0), (1, FaultName::PositionJump, 1, 1));
+        assert!(faults[0].what.starts_with("the zero of 1 sessions (2) is another one"), "{}", faults[0].what);
         // Eight rows of motion are between the levels that are compared.
         assert!((others[0].1 - 0.0123).abs() < 1e-4, "{others:?}");
     }

@@ -79,7 +79,8 @@ fn may_be(value: f64, quantity: Quantity, columns: &[MappedColumn], allowed: imp
 
 /// A torque beyond what a drive bears is in another unit, and is not used.
 fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
-    let limit = gear.largest_torque_n_m;
+    let said = columns.iter().any(|column| column.quantity == Quantity::Torque && column.said);
+    let limit = if said { Gear::LARGEST_TORQUE_N_M } else { gear.plausible_torque_n_m };
     let Some(values) = log.get(Quantity::Torque) else { return Ok(()) };
     let mut sizes: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).map(f64::abs).collect();
     let size = quantile_of(&mut sizes, 0.95);
@@ -261,6 +262,10 @@ mod tests {
     /// A drive of ratio 50 to and fro under a load in N·m at a temperature in °C, each times and plus something; angles
     /// in radians times some number.
     fn read(columns: &str, torque: f64, celsius: f64, angles: [f64; 2]) -> Result<Recording, String> {
+        read_of(&Gear::of_ratio(50.0), columns, torque, celsius, angles)
+    }
+
+    fn read_of(gear: &Gear, columns: &str, torque: f64, celsius: f64, angles: [f64; 2]) -> Result<Recording, String> {
         let mut text = "time_s,generator_rad,output_rad,torque_n_m,temperature_c\n".to_owned();
         for k in 0..1200 {
             let x = f64::from(k);
@@ -272,7 +277,7 @@ mod tests {
             text += &(fields.map(|field| format!("{field:.9}")).join(",") + "\n");
         }
         let map = ColumnMap::of_options(columns, None, None).unwrap();
-        parse("m.csv", text.as_bytes(), &map, &Gear::of_ratio(50.0)).map_err(|error| error.to_string())
+        parse("m.csv", text.as_bytes(), &map, gear).map_err(|error| error.to_string())
     }
 
     /// The channel of the unit fault, what was done, and what is said.
@@ -301,6 +306,15 @@ mod tests {
         assert_eq!(unit_fault(&soft), None);
         assert!((soft.sessions[0].torque_n_m.as_ref().unwrap()[392] - 3.389_55).abs() < 1e-3);
         assert!(read("", 1e7, 0.0, [1.0; 2]).unwrap_err().contains("at most 1e4"));
+        // 30 N·m in N·cm, where the drive would wind up by 5.7 degrees: asked, and believed where it is said.
+        let gear = crate::nominal::Nominal::from_toml("n.toml", &crate::nominal::Nominal::template(98, 100)).unwrap();
+        let gear = Gear { ratio: 50.0, plausible_torque_n_m: gear.gear().plausible_torque_n_m, ..Gear::of_ratio(50.0) };
+        assert!((300.0..3000.0).contains(&gear.plausible_torque_n_m), "{}", gear.plausible_torque_n_m);
+        let found = read_of(&gear, "", 100.0, 0.0, [1.0; 2]).unwrap();
+        assert!(unit_fault(&found).unwrap().2.contains("--columns torque=torque_n_m:N.cm"));
+        assert!(found.sessions[0].torque_n_m.is_none());
+        assert_eq!(unit_fault(&read_of(&gear, "torque=torque_n_m:N.m", 100.0, 0.0, [1.0; 2]).unwrap()), None);
+        assert_eq!(unit_fault(&read_of(&gear, "", 1.0, 0.0, [1.0; 2]).unwrap()), None);
     }
 
     #[test]

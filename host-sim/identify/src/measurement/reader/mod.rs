@@ -83,6 +83,8 @@ pub(crate) struct Columns {
     pub lines: Vec<u64>,
     /// Rows that have fewer fields than names, or more which are not blank: line, and fields it has.
     pub odd: Vec<(u64, usize)>,
+    /// Lines that repeat the names of the columns.
+    pub restarts: Vec<u64>,
     /// Sentences on what was left out.
     pub notes: Vec<String>,
 }
@@ -111,7 +113,7 @@ impl Sheet {
         let [zeros, quotes] = [0, b'"'].map(|byte| memchr::memchr(byte, &self.text).is_some());
         // Lines that begin with a word where most have a number: what follows them says whether they are rows.
         let mut wordy: Vec<(u64, csv::ByteRecord)> = Vec::new();
-        let (mut holes, mut restarts) = (Vec::new(), Vec::new());
+        let mut holes = Vec::new();
         let mut records = self.layout.separator.records(&self.text[begins..]);
         let mut record = csv::ByteRecord::new();
         loop {
@@ -140,7 +142,7 @@ impl Sheet {
                 wordy.push((line, record.clone()));
                 continue;
             }
-            self.sort_out(places, &mut wordy, &mut restarts, &mut read)?;
+            self.sort_out(places, &mut wordy, &mut read)?;
             self.read_row(places, &record, line, &mut read);
         }
         if let Some(first) = holes.first() {
@@ -161,10 +163,11 @@ impl Sheet {
             let from = shortened(&from);
             read.notes.push(format!("{lines} at the end, from \"{from}\" on, {are} no {rows}: left out"));
         } else {
-            self.sort_out(places, &mut wordy, &mut restarts, &mut read)?;
+            self.sort_out(places, &mut wordy, &mut read)?;
         }
-        if let Some(first) = restarts.first() {
-            let times = if restarts.len() == 1 { "once".to_owned() } else { format!("{} times", restarts.len()) };
+        if let Some(first) = read.restarts.first() {
+            let count = read.restarts.len();
+            let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
             read.notes.push(format!(
                 "the names of the columns are repeated {times}, first in line {first}: these lines are left out"
             ));
@@ -217,12 +220,11 @@ impl Sheet {
         &self,
         places: &[usize],
         wordy: &mut Vec<(u64, csv::ByteRecord)>,
-        restarts: &mut Vec<u64>,
         read: &mut Columns,
     ) -> Result<(), TableProblem> {
         let names = wordy.iter().find(|(_, record)| self.has_the_names(record));
         if let Some((line, _)) = names {
-            restarts.push(*line);
+            read.restarts.push(*line);
             wordy.clear();
         }
         for (line, record) in wordy.drain(..) {
@@ -246,7 +248,8 @@ impl Sheet {
 impl Columns {
     /// The same rows with other columns.
     pub(super) fn with_cells(&self, cells: Vec<Cells>) -> Columns {
-        Columns { cells, lines: self.lines.clone(), odd: self.odd.clone(), notes: Vec::new() }
+        let (lines, odd, restarts) = (self.lines.clone(), self.odd.clone(), self.restarts.clone());
+        Columns { cells, lines, odd, restarts, notes: Vec::new() }
     }
 
     /// Leaves out the last row if it breaks off before the field at `place`; its line.
