@@ -869,10 +869,9 @@ fn a_recording_too_short_to_tell_a_wander_from_none_is_taken_to_have_one() {
 #[test]
 fn a_lubricant_thickens_by_vogels_law_and_as_an_exponential_where_it_does_not_bend() {
     excited(|on, laws| {
-        let law = laws.iter().find(|law| law.is(CauseName::LubricantViscosity) && !law.is_load()).unwrap();
+        let law = laws.iter().find(|law| law.is(CauseName::LubricantViscosity)).unwrap();
         let (per_k, bend) = (0.02, 1.0 / 115.0);
-        let bent = &law.columns(on, &[1.0, per_k, bend])[0].values;
-        let straight = &law.columns(on, &[1.0, per_k, 0.0])[0].values;
+        let [bent, straight] = [bend, 0.0].map(|bend| law.load(on, &[1.0, 1.0, per_k, bend]).unwrap());
         // ln ν = B / (T + C): C where it sets, B by the slope at the nominal temperature.
         let nominal = on.nominal.temperature_c;
         let c = 1.0 / bend - nominal;
@@ -1170,8 +1169,7 @@ fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
             roles: vec![Tag::SIZE],
             coefficients: vec![0.6],
         };
-        let drags = |law: &&super::Law| law.is(CauseName::LubricantViscosity) && law.is_load();
-        let drag = laws.iter().find(drags).unwrap();
+        let drag = law(laws, CauseName::LubricantViscosity);
         for (law, values) in
             [(drag, vec![3.0, 0.8, 0.03, 0.005]), (law(laws, CauseName::GravityTorque), vec![5.0, 0.7])]
         {

@@ -120,13 +120,6 @@ impl Drag {
         })
     }
 
-    /// Arcsec for 1 N·m of it at the mean speed and the nominal temperature; counted in N·m for a drive that does not
-    /// give.
-    fn wind_up(self, on: &Excitation<'_>) -> Vec<f64> {
-        let slope = on.slope_at_rest().map_or(1.0, |slope| on.softer * slope);
-        self.share(on).into_iter().map(|share| share * slope).collect()
-    }
-
     /// It by name, of this size.
     fn named(self, drag_n_m: f64) -> Vec<Named> {
         vec![
@@ -152,31 +145,8 @@ const LEAST_ABOVE_SETTING: f64 = 0.2;
 const MOST_BEND: f64 = 0.01;
 
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to
-/// exponential).
-fn lubricant_viscosity() -> Law {
-    Law::new(CauseName::LubricantViscosity, |on, shape| {
-        let drag = Drag::of(shape);
-        let wind_up = drag.wind_up(on);
-        let size = super::super::rows::rms(&wind_up).max(1e-12);
-        vec![
-            main(wind_up, 15.0 / size).called(Tag::SIZE),
-            nuisance(Drag { power: 0.5 * drag.power, ..drag }.wind_up(on), 0.15),
-            nuisance(Drag { per_k: 0.5 * drag.per_k, ..drag }.wind_up(on), 0.15),
-        ]
-    })
-    .shapes([
-        Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 3),
-        Shape::by_factors(Name::PerK, 0.008, 0.12, 4),
-        Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
-    ])
-    .parameters_by(|_, shape, c| Drag::of(shape).named(c.of(Tag::SIZE)))
-    .physical_if(|shape, c| c.of(Tag::SIZE) > 0.0 && Drag::of(shape).is_viscous())
-    .evaluated_on_averages()
-}
-
-/// Drag of the lubricant as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other
-/// flank.
-fn lubricant_load(on: &Excitation<'_>) -> Law {
+/// exponential). A load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
+fn lubricant_viscosity(on: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
     let load = |on: &Excitation<'_>, shape: Shaped<'_>| -> Vec<f64> {
         let drag_n_m = shape.of(Name::DragNM);
@@ -195,11 +165,16 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
             .evaluated_on_averages()
             .adds_load(load)
             .led_by(
-                |on, shape| vec![main(Drag::of(shape).wind_up(on), 10.0).called(Tag::SIZE)],
+                |on, shape| {
+                    // Arcsec for 1 N·m of it at the mean speed and the nominal temperature.
+                    let slope = on.slope_at_rest().map_or(0.0, |slope| on.softer * slope);
+                    let wind_up = Drag::of(shape).share(on).into_iter().map(|share| share * slope).collect();
+                    vec![main(wind_up, 10.0).called(Tag::SIZE)]
+                },
                 |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Tag::SIZE).max(0.0))])],
             );
     law.acts.in_crossings = true;
-    law
+    law.variant("load")
 }
 
 /// The clearance follows the temperature.
@@ -245,7 +220,7 @@ pub(crate) const LUBRICANT_VISCOSITY: CauseSpec = CauseSpec {
     words: "drag of the lubricant",
     does: "a load against the motion that grows with speed and cold",
     kin: Kin::Drag,
-    needs: &[Need::Time, Need::Motion],
+    needs: &[Need::Time, Need::Motion, Need::Spring],
     in_table: InTable::No("it follows the speed, and a table knows none"),
     made_by_loads: true,
     parameters: &[
@@ -253,14 +228,10 @@ pub(crate) const LUBRICANT_VISCOSITY: CauseSpec = CauseSpec {
         number(Name::SpeedExponent, "of the speed", 0.2, 1.2, Value(2.0 / 3.0)),
         number(Name::RelativeDragPerK, "of the drag", -0.15, 0.0, Value(-0.035)),
     ],
-    laws: |on| {
-        let winds_up = on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0;
-        let load = winds_up.then(|| lubricant_load(on).variant("load"));
-        std::iter::once(lubricant_viscosity()).chain(load).collect()
-    },
+    laws: |on| vec![lubricant_viscosity(on)],
     simulated: |on, p| {
         let [drag, power] = [Name::DragNM, Name::SpeedExponent].map(|name| (name, p(name)));
-        lubricant_load(on).with(&[drag, power, (Name::PerK, -p(Name::RelativeDragPerK))], [])
+        lubricant_viscosity(on).with(&[drag, power, (Name::PerK, -p(Name::RelativeDragPerK))], [])
     },
     ..plain()
 };
