@@ -10,11 +10,11 @@ use flexspline::Table;
 
 use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Excitation, Law, LawUnits, Regressor, Tag, Tolerance, library, together};
+use super::candidate::{Acting, Excitation, Law, LawUnits, Tag, library, together};
 use super::model::{Problem, Scaffold, terms_at};
 use super::report::Parameter;
 use super::resolution::averages_hide;
-use super::rows::{Rows, add_scaled};
+use super::rows::{Rows, add_scaled, combined};
 use super::select::{Selected, fixed, less, settle_each};
 use super::thinned::{SampleToFit, Thinned};
 use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
@@ -84,7 +84,7 @@ pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nomina
         let laws: Vec<Law> = causes.iter().flat_map(|(name, _)| (name.spec().laws)(&on)).collect();
         let acting = causes.iter().map(|(name, fit)| fit.acting(*name, &on, &laws)).collect::<Option<Vec<_>>>()?;
         for (cause, columns) in acting.iter().zip(together(&on, &acting)) {
-            add_part(&mut added, &columns, &cause.coefficients);
+            columns.iter().zip(&cause.coefficients).for_each(|(of, c)| add_scaled(&mut added, &of.values, *c));
         }
     }
     Some(rows.sessions.iter().map(|session| added[session.clone()].to_vec()).collect())
@@ -125,14 +125,6 @@ impl FittedLaw {
             roles,
             coefficients: self.coefficients.clone(),
         })
-    }
-}
-
-/// Adds what the columns of a model predict: not what was before the rows that it was fitted to.
-fn add_part(sum: &mut [f64], columns: &[Regressor], coefficients: &[f64]) {
-    let predicts = |column: &Regressor| !matches!(column.tolerance, Tolerance::History(_));
-    for (column, c) in columns.iter().zip(coefficients).filter(|(column, _)| predicts(column)) {
-        add_scaled(sum, &column.values, *c);
     }
 }
 
@@ -304,8 +296,8 @@ impl Extended {
             })
             .collect();
         for (cause, columns) in self.causes.iter().zip(together(on, &causes)) {
-            let mut part = vec![0.0; on.rows.len()];
-            add_part(&mut part, &columns, &cause.coefficients);
+            let columns = columns.iter().map(|column| column.values.as_slice());
+            let part = combined(on.rows.len(), columns, &cause.coefficients);
             add_scaled(&mut extended, &part, 1.0);
             parts.push(part);
         }

@@ -225,7 +225,7 @@ impl White {
             .zip(&self.size)
             .map(|(tolerance, size)| match tolerance {
                 Tolerance::Main(prior) => *prior,
-                Tolerance::Nuisance(share) | Tolerance::Beside(share) | Tolerance::History(share) => {
+                Tolerance::Nuisance(share) | Tolerance::Beside(share) => {
                     Prior { mean: 0.0, std: share * explained / size.max(1e-9) }
                 }
             })

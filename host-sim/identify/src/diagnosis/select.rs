@@ -142,7 +142,7 @@ pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
     };
     [
         part(|t| matches!(t, Tolerance::Main(_))),
-        part(|t| matches!(t, Tolerance::Nuisance(_) | Tolerance::History(_))),
+        part(|t| matches!(t, Tolerance::Nuisance(_))),
         part(|t| matches!(t, Tolerance::Beside(_))),
     ]
 }

@@ -291,8 +291,6 @@ pub(crate) enum Tolerance {
     /// A deviation that comes with the cause by right, and may well be the larger part of it: clearance that a wheel
     /// off its place takes.
     Beside(f64),
-    /// A nuisance of these rows alone: what was before anybody recorded. It predicts nothing.
-    History(f64),
 }
 
 /// A column of a law.
@@ -336,11 +334,6 @@ fn nuisance(values: Vec<f64>, share: f64) -> Regressor {
 /// A column of what comes with a cause.
 fn beside(values: Vec<f64>, share: f64) -> Regressor {
     Regressor::new(values, Tolerance::Beside(share))
-}
-
-/// A column of what was before the first row of a session.
-fn history(values: Vec<f64>, share: f64) -> Regressor {
-    Regressor::new(values, Tolerance::History(share))
 }
 
 /// A parameter for the report: name and value.

@@ -33,7 +33,7 @@ impl Simulated {
             Some(at) => given.remove(at).1,
             None => match column.tolerance {
                 Tolerance::Main(prior) => prior.mean,
-                Tolerance::Nuisance(_) | Tolerance::Beside(_) | Tolerance::History(_) => 0.0,
+                Tolerance::Nuisance(_) | Tolerance::Beside(_) => 0.0,
             },
         };
         let coefficients = columns.iter().map(coefficient).collect();

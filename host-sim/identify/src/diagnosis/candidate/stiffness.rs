@@ -4,9 +4,8 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use super::super::prepare::Jump;
-use super::super::rows::rms;
 use super::geometry::{Angle, angle, pulse, weighted_waves};
-use super::{Coefficients, Excitation, Law, Shape, Shaped, Tag, by_row, history, main, nuisance};
+use super::{Coefficients, Excitation, Law, Shape, Shaped, Tag, by_row, main, nuisance};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     CauseName, CauseSpec, InTable, Kin,
@@ -44,29 +43,6 @@ pub(super) fn follow(torque: &[f64], session: Range<usize>, slip: f64, first: f6
         held[k] = z / slip;
     }
 }
-
-/// Half the difference between the two extremes that the element may have begun a session with: what nobody recorded,
-/// until the torque has swung far enough to wipe it out. One column for each of the sessions that remember longest.
-fn unknown_beginnings(on: &Excitation<'_>, slip: f64) -> Vec<Vec<f64>> {
-    let torque = &on.rows.torque;
-    let mut columns: Vec<Vec<f64>> = on
-        .rows
-        .sessions
-        .iter()
-        .map(|session| {
-            let (mut high, mut low) = (vec![0.0; torque.len()], vec![0.0; torque.len()]);
-            follow(torque, session.clone(), slip, slip, &mut high);
-            follow(torque, session.clone(), slip, -slip, &mut low);
-            high.iter().zip(&low).map(|(h, l)| 0.5 * (h - l)).collect()
-        })
-        .collect();
-    columns.sort_by(|a, b| rms(b).total_cmp(&rms(a)));
-    columns.truncate(MOST_BEGINNINGS);
-    columns
-}
-
-/// Sessions whose beginning is left open, at most.
-const MOST_BEGINNINGS: usize = 10;
 
 /// The spring that a hysteresis is stated by, and those that slip earlier and later: at these shares of its torque.
 const SPRING: Tag = Tag("spring");
@@ -115,7 +91,6 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         let wider = stop_operator(on, slip).into_iter().map(f64::abs).collect();
         columns.push(nuisance(wider, WIDER_ONE_WAY));
         columns.push(nuisance(by_row(on, |k| load_share(on, k).abs()), WIDER_ONE_WAY));
-        columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| history(held, 1.0)));
         columns
     })
     .evaluated_on_averages()
@@ -130,7 +105,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     law.wrong.doubt = 0.15;
     law.search.whole = true;
     law.wrong.misfit_unnamed = LOOKS_LIKE_CREEP;
-    // What springs hold goes with the load; the wind-up in the law takes that back, and the beginnings are nobody's.
+    // What springs hold goes with the load; the wind-up in the law takes that back.
     law.wrong.most_nuisance = 2.0;
     law
 }
