@@ -166,7 +166,7 @@ impl Series {
 
 impl Extended {
     /// Fits the nominal model and the named causes to the sessions that are `used`; of the others only the history
-    /// counts (time, travel under load). A name that these data cannot speak about (a load without torque, a law of
+    /// counts (time, travel). A name that these data cannot speak about (a load without torque, a law of
     /// teeth without teeth) is left out.
     ///
     /// # Errors

@@ -216,13 +216,12 @@ fn fingerprint(parameters: &BTreeMap<String, f64>) -> String {
 /// A number of [`LawUnits`] and its name in a file.
 type ScaleField = (&'static str, fn(&mut LawUnits) -> &mut f64);
 
-const SCALES: [ScaleField; 7] = [
+const SCALES: [ScaleField; 6] = [
     ("load_n_m", |s| &mut s.load),
     ("mean_speed_rad_s", |s| &mut s.mean_speed),
     ("begin_s", |s| &mut s.begin_s),
     ("duration_s", |s| &mut s.duration_s),
     ("travel_rad", |s| &mut s.travel),
-    ("work_rad_n_m", |s| &mut s.work),
     ("arcsec_per_um", |s| &mut s.arcsec_per_um),
 ];
 

@@ -196,8 +196,6 @@ pub struct LawUnits {
     pub duration_s: f64,
     /// Travel of the generator from the first row to the last, rad.
     pub travel: f64,
-    /// Travel under load, rad N·m.
-    pub work: f64,
     /// Arcsec at the output for 1 µm on the pitch circle.
     pub arcsec_per_um: f64,
     /// Jumps found in the data.
@@ -213,7 +211,6 @@ impl LawUnits {
             moving += 1;
             turned += speed.abs();
         }
-        let work = (1..rows.len()).map(|k| (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs()).sum();
         let begin_s = rows.time.first().copied().unwrap_or(0.0);
         LawUnits {
             load: rows.load_scale(),
@@ -221,7 +218,6 @@ impl LawUnits {
             begin_s,
             duration_s: rows.time.last().copied().unwrap_or(0.0) - begin_s,
             travel: rows.travel.last().copied().unwrap_or(0.0),
-            work,
             arcsec_per_um: flexspline_base::units::ARCSEC_PER_RAD * 1e-3 / pitch_radius_mm,
             jumps,
         }

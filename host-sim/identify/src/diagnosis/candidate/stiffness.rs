@@ -209,30 +209,18 @@ fn backlash_growth() -> Law {
     law
 }
 
-/// WearsWith of wear from 0 at the first row to 1 at the last.
-#[derive(Clone, Copy)]
-enum WearsWith {
-    Time,
-    Travel,
-    Work,
-}
-
-/// A clearance that widens during the data, with time, travel, or travel under load (Archard).
-fn wear(by: WearsWith) -> Law {
+/// A clearance that widens during the data, with the time or with the travel of the generator.
+fn wear(timed: bool) -> Law {
     Law::new(CauseName::Wear, move |on, shape| {
         let rows = on.rows;
-        let travelled = |k: usize| (rows.travel[k] - rows.travel[k.saturating_sub(1)]).max(0.0);
-        let sum_of = |step: &dyn Fn(usize) -> f64| {
-            let sum = |sum: &mut f64, k: usize| {
-                *sum += step(k);
-                Some(*sum)
-            };
-            (0..rows.len()).scan(0.0, sum).collect::<Vec<f64>>()
+        let travelled = |sum: &mut f64, k: usize| {
+            *sum += (rows.travel[k] - rows.travel[k.saturating_sub(1)]).max(0.0);
+            Some(*sum)
         };
-        let (done, all) = match by {
-            WearsWith::Time => (by_row(on, |k| (rows.time[k] - on.scales.begin_s).max(0.0)), on.scales.duration_s),
-            WearsWith::Travel => (sum_of(&travelled), on.scales.travel),
-            WearsWith::Work => (sum_of(&|k| travelled(k) * rows.torque[k].abs()), on.scales.work),
+        let (done, all): (Vec<f64>, f64) = if timed {
+            (by_row(on, |k| (rows.time[k] - on.scales.begin_s).max(0.0)), on.scales.duration_s)
+        } else {
+            ((0..rows.len()).scan(0.0, travelled).collect(), on.scales.travel)
         };
         let all = all.max(1e-12);
         let exponent = shape.of(Name::Exponent);
@@ -377,15 +365,12 @@ pub(crate) const WEAR: CauseSpec = CauseSpec {
     parameters: &[number(Name::GrowthArcsec, "whole width, first row to last", 0.0, 10_000.0, Value(40.0))],
     laws: |on| {
         let timed = on.rows.recorded.time;
-        let mut laws = vec![wear(WearsWith::Travel).variant("travel")];
-        laws.extend(timed.then(|| wear(WearsWith::Time).variant("time")));
-        laws.extend((on.scales.load > 0.0).then(|| wear(WearsWith::Work).variant("work")));
+        let mut laws = vec![wear(false).variant("travel")];
+        laws.extend(timed.then(|| wear(true).variant("time")));
         laws.extend(wear_between_sessions(on).filter(|_| timed));
         laws
     },
-    simulated: |_, p| {
-        wear(WearsWith::Travel).with(&[(Name::Exponent, 1.0)], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec))])
-    },
+    simulated: |_, p| wear(false).with(&[(Name::Exponent, 1.0)], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec))]),
     ..plain()
 };
 
