@@ -1160,33 +1160,6 @@ fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
 }
 
 #[test]
-fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
-    use super::candidate::{Acting, Tag, together};
-    excited(|on, laws| {
-        let spring = || Acting {
-            law: law(laws, CauseName::StiffnessError),
-            values: vec![],
-            roles: vec![Tag::SIZE],
-            coefficients: vec![0.6],
-        };
-        let drag = law(laws, CauseName::LubricantViscosity);
-        for (law, values) in
-            [(drag, vec![3.0, 0.8, 0.03, 0.005]), (law(laws, CauseName::GravityTorque), vec![5.0, 0.7])]
-        {
-            let load = || Acting { law, values: values.clone(), roles: vec![Tag::SIZE], coefficients: vec![1.0] };
-            let (alone, beside) = (together(on, &[load()]), together(on, &[spring(), load()]));
-            // Wind-up and play together, and play alone: what is left is wind-up.
-            let [of_alone, of_beside] = [&alone[0], &beside[1]];
-            for k in 0..on.rows.len() {
-                let wound = |columns: &[super::candidate::Regressor]| columns[0].values[k] - columns[1].values[k];
-                assert!((wound(of_beside) - 1.6 * wound(of_alone)).abs() < 1e-9, "{} row {k}", law.label);
-            }
-            assert_eq!(beside[0][0].values, on.base.wind_up, "the load is not counted twice");
-        }
-    });
-}
-
-#[test]
 fn the_orders_of_an_encoder_are_told_apart_with_their_sizes() {
     let hidden = [
         "output_encoder_eccentricity:amplitude_arcsec=30,phase_rad=0.7",

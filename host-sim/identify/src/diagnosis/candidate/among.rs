@@ -3,8 +3,6 @@
 //! eccentric wheel binds; and two wheels off their axis, or one under a generator that is, meet in the same two
 //! zones of teeth, of which only the one ahead carries.
 //!
-//! A softer spring gives way to what is added to the load as well.
-//!
 //! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the
 //! later one is evaluated with the earlier in place, and together they make what both do.
 
@@ -44,7 +42,6 @@ pub(crate) struct Among {
     /// Change of half the clearance by them, arcsec.
     widened: Option<Vec<f64>>,
     zones: Option<Zones>,
-    softer: f64,
 }
 
 /// The base parameter that a stiffness error is out of tolerance of.
@@ -55,9 +52,8 @@ impl Law {
     /// decides.
     #[must_use]
     pub(crate) fn acts_on(&self, other: &Law) -> bool {
-        // What a load winds up in a softer spring is in the load's law.
+        // A spring that is out of tolerance is one under the torque recorded.
         self.is_load() && !other.is_load() && !other.is_spring()
-            || self.is_spring() && other.is_load()
             || other.acts.meets_zones && (self.is_in_zones() || self.wrong.kin == Kin::Clearance)
     }
 
@@ -77,11 +73,8 @@ impl Among {
     /// The excitation that `acting` causes leave; nothing where none of them does anything to others.
     #[must_use]
     pub fn of(on: &Excitation<'_>, acting: &[Acting<'_>]) -> Option<Among> {
-        let mut among = Among { loaded: None, widened: None, zones: None, softer: 1.0 };
+        let mut among = Among { loaded: None, widened: None, zones: None };
         for cause in acting {
-            if cause.law.is_spring() {
-                among.softer += cause.by_role().of(Tag::SIZE);
-            }
             if let Some(load) = cause.law.load(on, &cause.values) {
                 let (rows, _) = among.loaded.get_or_insert_with(|| (on.rows.clone(), on.base.without_floating()));
                 add_scaled(&mut rows.torque, &load, 1.0);
@@ -105,7 +98,7 @@ impl Among {
             }
         }
         (among.widened, among.zones) = (widened, zones);
-        let changed = among.loaded.is_some() || among.widened.is_some() || among.zones.is_some() || among.softer != 1.0;
+        let changed = among.loaded.is_some() || among.widened.is_some() || among.zones.is_some();
         changed.then_some(among)
     }
 
@@ -113,14 +106,7 @@ impl Among {
     #[must_use]
     pub(crate) fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
         let (rows, base) = self.loaded.as_ref().map_or((on.rows, on.base), |(rows, base)| (rows, base));
-        Excitation {
-            rows,
-            base,
-            widened: self.widened.as_deref(),
-            zones: self.zones.as_ref(),
-            softer: self.softer,
-            ..*on
-        }
+        Excitation { rows, base, widened: self.widened.as_deref(), zones: self.zones.as_ref(), ..*on }
     }
 }
 

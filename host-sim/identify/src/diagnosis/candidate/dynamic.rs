@@ -108,7 +108,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
                 // Wind-up for 1 N·m more, at the load that is there.
                 let slope = |k: usize| {
                     let more = on.nominal.wind_up_arcsec(rows.torque[k] + 0.5);
-                    on.softer * (more - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5))
+                    more - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5)
                 };
                 let at = |k: usize| rows.output[k] + sign * rows.orientation[k];
                 vec![

@@ -57,8 +57,6 @@ pub struct Excitation<'a> {
     pub widened: Option<&'a [f64]>,
     /// How far other causes bring one zone of teeth ahead of the other.
     pub zones: Option<&'a Zones>,
-    /// By how much more the drive winds up than the nominal one.
-    pub softer: f64,
 }
 
 /// Generator turns below which a pulse in one place is not distinguishable from a wave; as in the picture of a
@@ -84,7 +82,7 @@ impl<'a> Excitation<'a> {
     /// The recorded one.
     #[must_use]
     pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a LawUnits) -> Excitation<'a> {
-        Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
+        Excitation { rows, nominal, base, scales, widened: None, zones: None }
     }
 
     /// Other rows, with the nominal model over them, and nothing that other causes change.
@@ -178,7 +176,7 @@ impl<'a> Excitation<'a> {
 
     /// Wind-up (arcsec) by a load in addition to the recorded torque at row `k`, `torque` (N·m) being both.
     fn wound_up(&self, k: usize, torque: f64) -> f64 {
-        self.softer * (self.nominal.wind_up_arcsec(torque) - self.base.wind_up[k])
+        self.nominal.wind_up_arcsec(torque) - self.base.wind_up[k]
     }
 }
 

@@ -167,7 +167,7 @@ fn lubricant_viscosity(on: &Excitation<'_>) -> Law {
             .led_by(
                 |on, shape| {
                     // Arcsec for 1 N·m of it at the mean speed and the nominal temperature.
-                    let slope = on.slope_at_rest().map_or(0.0, |slope| on.softer * slope);
+                    let slope = on.slope_at_rest().unwrap_or(0.0);
                     let wind_up = Drag::of(shape).share(on).into_iter().map(|share| share * slope).collect();
                     vec![main(wind_up, 10.0).called(Tag::SIZE)]
                 },
