@@ -1,10 +1,13 @@
 //! Whether several logs are of one unit, read in one way.
 
+use std::f64::consts::TAU;
+
 use super::choose::PENALTIES;
 use super::folds::{Chosen, Folds, Row};
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
 use super::rows::Rows;
+use super::zero::{PhaseSearch, within};
 use super::{Model, SAME_TORQUE};
 use crate::measurement::{Recording, least_and_most};
 
@@ -21,13 +24,18 @@ pub(super) struct Agreement {
     odd: Option<usize>,
 }
 
+/// The rows with each log for a fold with a zero of its own, and all parts with the least penalty.
+fn by_log(rows: &Rows, parts: &[PartName], scales: &Scales) -> (Folds, Vec<Chosen>) {
+    let by_log: Vec<Row> = rows.rows.iter().map(|row| Row { fold: row.at.log, ..*row }).collect();
+    let chosen = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect();
+    (Folds::new(&by_log, parts, scales, rows.means_arcsec.len(), true), chosen)
+}
+
 impl Agreement {
     /// Of two and more logs.
     pub fn of(rows: &Rows, parts: &[PartName], scales: &Scales) -> Option<Agreement> {
-        let by_log: Vec<Row> = rows.rows.iter().map(|row| Row { fold: row.at.log, ..*row }).collect();
-        let folds = Folds::new(&by_log, parts, scales, rows.means_arcsec.len(), true);
+        let (folds, chosen) = by_log(rows, parts, scales);
         let all = folds.all();
-        let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect();
         let rms = |of: &[usize], squares: f64| (squares / folds.rows(of)).sqrt();
         let alone = |of: &[usize]| rms(of, of.iter().map(|log| folds.left_in(*log, &[*log], &chosen)).sum());
         let together = |of: &[usize]| rms(of, of.iter().map(|log| folds.left_in(*log, of, &chosen)).sum());
@@ -101,10 +109,11 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
 /// of another unit. Guesses.
 const TURNED_BACK: f64 = 0.8;
 const AS_ALONE: [f64; 2] = [1.1, 1.3];
-/// Times that the angle is looked for anew, as the curve that all logs share goes with it.
-const TURNS: usize = 4;
-/// Step of the generator that slopes are taken over, rad: a small part of a tooth pitch.
-const STEP_RAD: f64 = 1e-3;
+/// Rows that an angle is looked for with, and steps over a generator turn, coarse ones and the fine ones in each: an
+/// eighth of the wave of the highest order, and less.
+const ROWS_OF_A_SEARCH: usize = 300;
+const STEPS_OF_A_TURN: f64 = 48.0;
+const FINE_STEPS: f64 = 8.0;
 
 /// Says of logs that agree so far as `agreement` says whose generators have unlike zeros, and by how much.
 pub(super) fn generators_turned(
@@ -119,24 +128,34 @@ pub(super) fn generators_turned(
     if agreement.alone_arcsec.powi(2) >= TURNED_BACK * before * before {
         return None;
     }
-    let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect();
-    let (mut turned, mut rows) = (vec![0.0; files.len()], rows.clone());
-    for _ in 0..TURNS {
-        let folds = rows.folds_of(parts, &model.scales);
-        let coefficients = folds.coefficients(&chosen, &[])?;
-        let fitted = Model { chosen: chosen.clone(), coefficients, scales: model.scales };
-        let by = angles_off(&rows, &fitted, prior, files.len());
-        turned.iter_mut().zip(&by).for_each(|(turned, by)| *turned += by);
-        for row in &mut rows.rows {
-            row.at.generator_rad -= by[row.at.log];
-            row.at.output_rad -= by[row.at.log] / prior.nominal.ratio;
-        }
-        rows = rows.less(prior);
+    let (folds, chosen) = by_log(rows, parts, &model.scales);
+    let first = Model { coefficients: folds.fit(&[0], &chosen, &[])?, chosen, scales: model.scales };
+    let (ratio, says) = (prior.nominal.ratio, |at: &State| first.says_arcsec(at, prior));
+    let in_a_turn = [PartName::OutputAngle, PartName::MaterialAngle].iter().all(|part| first.of(*part).is_none());
+    let repeats = TAU * if in_a_turn && prior.table.is_none() { 1.0 } else { ratio.abs() };
+    let step = TAU / STEPS_OF_A_TURN;
+    let turned_by = |log: usize| {
+        let of_log = rows.rows.iter().filter(move |row| row.at.log == log);
+        let friction = model.scales.friction_n_m;
+        let search =
+            PhaseSearch::new(&says, ratio, (of_log, |row| row.measured_arcsec), friction, ROWS_OF_A_SEARCH);
+        let coarse = search.found(repeats, step, step / FINE_STEPS);
+        within(search.close_to(coarse.zero_rad, step / FINE_STEPS)[0], repeats)
+    };
+    let turned: Vec<f64> = (0..files.len()).map(|log| if log == 0 { 0.0 } else { turned_by(log) }).collect();
+    let mut rows = rows.clone();
+    for row in &mut rows.rows {
+        row.at.generator_rad -= turned[row.at.log];
+        row.at.output_rad -= turned[row.at.log] / ratio;
     }
+    let rows = rows.less(prior);
     let Agreement { alone_arcsec, together_arcsec: after, .. } = Agreement::of(&rows, parts, &model.scales)?;
     let is_near = after * after < TURNED_BACK * before * before && after < AS_ALONE[1] * alone_arcsec;
     is_near.then(|| {
-        let of = |(file, turned): (&Recording, &f64)| format!("{:+.2} deg in {}", turned.to_degrees(), file.file);
+        let of = |(file, turned): (&Recording, &f64)| {
+            let turns = if turned.abs() > TAU { format!(" ({:+.2} turns)", turned / TAU) } else { String::new() };
+            format!("{:+.2} deg{turns} in {}", turned.to_degrees(), file.file)
+        };
         let list: Vec<String> = files.iter().zip(&turned).skip(1).map(of).collect();
         if after >= AS_ALONE[0] * alone_arcsec {
             return format!(
@@ -154,28 +173,4 @@ pub(super) fn generators_turned(
             list.join(", ")
         )
     })
-}
-
-/// By how much the generator of each log is turned against that of the first, rad, to first order.
-fn angles_off(rows: &Rows, model: &Model, prior: &Prior<'_>, logs: usize) -> Vec<f64> {
-    let turned = |at: &State, by: f64| State {
-        generator_rad: at.generator_rad + by,
-        output_rad: at.output_rad + by / prior.nominal.ratio,
-        ..*at
-    };
-    let mut sums = vec![[0.0; 5]; logs];
-    for row in &rows.rows {
-        let says = |by: f64| model.says_arcsec(&turned(&row.at, by), prior);
-        let slope = (says(STEP_RAD) - says(-STEP_RAD)) / (2.0 * STEP_RAD);
-        let left = row.left_arcsec - model.adds_arcsec(&row.at);
-        let of_row = [1.0, slope, left, slope * slope, slope * left];
-        sums[row.at.log].iter_mut().zip(of_row).for_each(|(sum, of_row)| *sum += of_row);
-    }
-    // The slope of what is left over that of the curve, each less its mean over the log.
-    let off = |[rows, slope, left, square, product]: &[f64; 5]| {
-        let (variance, along) = (square - slope * slope / rows, product - slope * left / rows);
-        if variance > 0.0 { -along / variance } else { 0.0 }
-    };
-    let first = sums.first().map_or(0.0, off);
-    sums.iter().map(|sum| off(sum) - first).collect()
 }

@@ -10,9 +10,11 @@ use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 
 use super::GOLDEN;
+use super::folds::Row;
 use super::parts::State;
 use super::rows::Rows;
 use crate::least_squares::{FreeSpan, jackknife};
+use crate::measurement::median_of;
 use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -144,43 +146,107 @@ fn repeats(table: &Table<'_>) -> f64 {
     [pitch, TAU].into_iter().find(|by| differs(*by) < REPEATS_ARCSEC).unwrap_or(TAU * ratio)
 }
 
-/// Rows, with what no phase changes projected out.
-struct Projected<'a> {
-    table: &'a Table<'a>,
+/// Rows against a curve that goes with the angle of the generator; what no phase changes (the zero of each log, load,
+/// direction) is projected out.
+pub(super) struct PhaseSearch<'a> {
+    says: &'a dyn Fn(&State) -> f64,
+    ratio: f64,
     at: Vec<State>,
-    measured: Vec<f64>,
+    values: Vec<f64>,
     basis: FreeSpan,
 }
 
-impl<'a> Projected<'a> {
-    fn new(table: &'a Table<'a>, rows: &Rows, friction_n_m: f64, most: usize) -> Projected<'a> {
-        let every = rows.rows.len().div_ceil(most).max(1);
-        let places: Vec<usize> = (0..rows.rows.len()).step_by(every).collect();
-        let at: Vec<State> = places.iter().map(|k| rows.rows[*k].at).collect();
-        let measured = places.iter().map(|k| rows.rows[*k].measured_arcsec).collect();
-        let files = rows.rows.iter().map(|row| row.at.log + 1).max().unwrap_or(0);
+/// A phase that a search has found.
+#[derive(Clone, Copy)]
+pub(super) struct PhaseFound {
+    /// Generator angle of the rows where that of the curve is zero, rad.
+    pub zero_rad: f64,
+    /// Squares that it leaves, arcsec², the median of those of all places tried, and the least of those elsewhere.
+    least: f64,
+    usual: f64,
+    second: f64,
+}
+
+impl<'a> PhaseSearch<'a> {
+    /// Of about `most` of the rows, with a `value` of each, arcsec.
+    pub(super) fn new<'r>(
+        says: &'a dyn Fn(&State) -> f64,
+        ratio: f64,
+        (rows, value): (impl Iterator<Item = &'r Row> + Clone, fn(&Row) -> f64),
+        friction_n_m: f64,
+        most: usize,
+    ) -> PhaseSearch<'a> {
+        let every = rows.clone().count().div_ceil(most).max(1);
+        let some: Vec<&Row> = rows.step_by(every).collect();
+        let (at, values): (Vec<State>, Vec<f64>) = some.iter().map(|row| (row.at, value(row))).unzip();
+        let logs = at.iter().map(|at| at.log + 1).max().unwrap_or(0);
         let heaviest = at.iter().map(|at| at.torque_n_m.abs()).fold(1e-9, f64::max);
-        let mut columns: Vec<Vec<f64>> =
-            (0..files).map(|file| places.iter().map(|k| f64::from(rows.rows[*k].at.log == file)).collect()).collect();
-        columns.push(at.iter().map(|at| at.torque_n_m / heaviest).collect());
-        columns.push(at.iter().map(|at| (at.torque_n_m / heaviest).powi(3)).collect());
-        columns.push(at.iter().map(|at| at.way).collect());
         let flank = |at: &State| if at.torque_n_m.abs() > friction_n_m { at.torque_n_m.signum() } else { -at.way };
-        columns.push(at.iter().map(flank).collect());
-        let basis = FreeSpan::default().beyond(columns);
-        Projected { table, at, measured, basis }
+        let column = |of: &dyn Fn(&State) -> f64| at.iter().map(of).collect::<Vec<f64>>();
+        let zeros = (0..logs).map(|log| column(&|at| f64::from(at.log == log)));
+        let others = [
+            column(&|at| at.torque_n_m / heaviest),
+            column(&|at| (at.torque_n_m / heaviest).powi(3)),
+            column(&|at| at.way),
+            column(&flank),
+        ];
+        let basis = FreeSpan::default().beyond(zeros.chain(others));
+        PhaseSearch { says, ratio, at, values, basis }
     }
 
     /// Residual with a phase, arcsec.
     fn left(&self, zero_rad: f64) -> Vec<f64> {
-        let left = |(at, measured): (&State, &f64)| measured - steady(self.table, at, zero_rad);
-        self.basis.freed(self.at.iter().zip(&self.measured).map(left).collect())
+        let turned = |at: &State| State {
+            generator_rad: at.generator_rad - zero_rad,
+            output_rad: at.output_rad - zero_rad / self.ratio,
+            ..*at
+        };
+        let left = |(at, value): (&State, &f64)| value - (self.says)(&turned(at));
+        self.basis.freed(self.at.iter().zip(&self.values).map(left).collect())
     }
 
     fn squares(&self, zero_rad: f64) -> f64 {
         let left = self.left(zero_rad);
         dot(&left, &left)
     }
+
+    /// The phase that leaves least, of those within the angle after which the curve repeats: in coarse steps, then in
+    /// fine ones about the best places.
+    pub(super) fn found(&self, repeats: f64, coarse_step: f64, fine_step: f64) -> PhaseFound {
+        let count = (repeats / coarse_step).round() as usize;
+        let mut tried: Vec<(f64, f64)> =
+            (0..count).map(|k| k as f64 * coarse_step).map(|zero| (self.squares(zero), zero)).collect();
+        let usual = median_of(&mut tried.iter().map(|(squares, _)| *squares).collect::<Vec<f64>>());
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let around = (coarse_step / fine_step).ceil() as i32;
+        let close = |place: &(f64, f64)| {
+            let place = place.1;
+            (-around..=around).map(move |k| place + f64::from(k) * fine_step)
+        };
+        let close = tried.iter().take(CLOSELY).flat_map(close).map(|zero| (self.squares(zero), zero));
+        let (least, zero_rad) = close.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0.0));
+        let apart = |zero: f64| within(zero - zero_rad, repeats).abs();
+        let elsewhere = tried.iter().filter(|(_, zero)| apart(*zero) > 2.0 * coarse_step).map(|(squares, _)| *squares);
+        PhaseFound { zero_rad, least, usual, second: elsewhere.fold(f64::INFINITY, f64::min) }
+    }
+
+    /// The least of the parabola through what a phase and its neighbours a `step` away leave, rad, and its standard
+    /// deviation by blocks of the rows left out in turn.
+    pub(super) fn close_to(&self, zero_rad: f64, step: f64) -> [f64; 2] {
+        let three = [-1.0, 0.0, 1.0].map(|k| self.left(zero_rad + k * step));
+        let without = |begin: usize, end: usize| {
+            vertex(three.each_ref().map(|left| dot(left, left) - dot(&left[begin..end], &left[begin..end])))
+        };
+        let (rows, size) = (self.at.len(), self.at.len().div_ceil(BLOCKS).max(1));
+        let blocks: Vec<f64> =
+            (0..rows).step_by(size).map(|begin| without(begin, (begin + size).min(rows))).collect();
+        [zero_rad + without(0, 0) * step, jackknife(&blocks) * step]
+    }
+}
+
+/// An angle within half of a period of zero.
+pub(super) fn within(angle: f64, period: f64) -> f64 {
+    (angle + 0.5 * period).rem_euclid(period) - 0.5 * period
 }
 
 /// Where the parabola through three neighbours is least, in steps from the middle.
@@ -191,75 +257,34 @@ fn vertex([before, at, after]: [f64; 3]) -> f64 {
 
 /// Finds the phase of a table against logs.
 pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignment {
+    let says = |at: &State| steady(table, at, 0.0);
+    let ratio = table.drive().exact_ratio();
+    let of = |most: usize| {
+        PhaseSearch::new(&says, ratio, (rows.rows.iter(), |row| row.measured_arcsec), friction_n_m, most)
+    };
     let repeats = repeats(table);
     let pitch = TAU / f64::from(table.drive().ripple_order());
-    let coarse = Projected::new(table, rows, friction_n_m, LOOKED_AT);
     let fine_step = pitch / STEPS_OF_A_PITCH as f64;
     let coarse_step = if repeats <= pitch * 1.001 { fine_step } else { TAU / STEPS_OF_A_TURN as f64 };
-    let count = (repeats / coarse_step).round() as usize;
-    let mut tried: Vec<(f64, f64)> =
-        (0..count).map(|k| k as f64 * coarse_step).map(|zero| (coarse.squares(zero), zero)).collect();
-    let mut all: Vec<f64> = tried.iter().map(|(squares, _)| *squares).collect();
-    let usual = crate::measurement::median_of(&mut all);
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // Close by, in steps that a tooth pitch needs.
-    let best_places: Vec<f64> = tried.iter().take(CLOSELY).map(|(_, zero)| *zero).collect();
-    let around = (coarse_step / fine_step).ceil() as i32;
-    let (mut least, mut best) = (f64::INFINITY, 0.0);
-    for place in &best_places {
-        for k in -around..=around {
-            let zero = place + f64::from(k) * fine_step;
-            let squares = coarse.squares(zero);
-            if squares < least {
-                (least, best) = (squares, zero);
-            }
-        }
-    }
-    let apart = |zero: f64| {
-        let away = (zero - best).rem_euclid(repeats);
-        away.min(repeats - away)
-    };
-    let second = tried
-        .iter()
-        .filter(|(_, zero)| apart(*zero) > 2.0 * coarse_step)
-        .map(|(s, _)| *s)
-        .fold(f64::INFINITY, f64::min);
-
-    // With all rows: the least of a parabola, and the same of the blocks that are left.
-    let all = Projected::new(table, rows, friction_n_m, FOUND_WITH);
+    let PhaseFound { zero_rad: best, least, usual, second } = of(LOOKED_AT).found(repeats, coarse_step, fine_step);
+    let all = of(FOUND_WITH);
     let step = if least < usual * (1.0 - LEAST_GAIN) { fine_step } else { coarse_step };
-    let three = [-1.0, 0.0, 1.0].map(|k| all.left(best + k * step));
-    let whole = vertex(three.each_ref().map(|left| dot(left, left)));
-    let size = three[0].len().div_ceil(BLOCKS).max(1);
-    let without: Vec<f64> = (0..three[0].len())
-        .step_by(size)
-        .map(|begin| {
-            let end = (begin + size).min(three[0].len());
-            vertex(three.each_ref().map(|left| dot(left, left) - dot(&left[begin..end], &left[begin..end])))
-        })
-        .collect();
-    let spread = jackknife(&without);
-    let zero = best + whole * step;
-    let half = OF_95_OF_BLOCKS * spread * step;
-    let rms = |zero: f64| (all.squares(zero) / three[0].len() as f64).sqrt();
+    let [zero, std] = all.close_to(best, step);
+    let rms = |zero: f64| (all.squares(zero) / all.at.len() as f64).sqrt();
     let gain = 1.0 - least / usual.max(f64::MIN_POSITIVE);
     let flat = gain < LEAST_GAIN;
     let doubtful = !flat && second < least * (1.0 + LEAST_BEFORE_SECOND);
-    let within = (zero + 0.5 * repeats).rem_euclid(repeats) - 0.5 * repeats;
+    let takes = format!("the best phase takes {:.1} % of the squares that the usual one leaves", 100.0 * gain);
     let why = if flat {
-        format!(
-            "the best phase takes {:.1} % of the squares that the usual one leaves; {:.0} % are asked for",
-            100.0 * gain,
-            100.0 * LEAST_GAIN
-        )
+        format!("{takes}; {:.0} % are asked for", 100.0 * LEAST_GAIN)
     } else if doubtful {
         "another phase is as good".to_owned()
     } else {
-        format!("the best phase takes {:.1} % of the squares that the usual one leaves", 100.0 * gain)
+        takes
     };
     Alignment {
-        generator_zero_deg: within.to_degrees(),
-        generator_half_width_deg: half.to_degrees(),
+        generator_zero_deg: within(zero, repeats).to_degrees(),
+        generator_half_width_deg: (OF_95_OF_BLOCKS * std).to_degrees(),
         repeats_deg: repeats.to_degrees(),
         left_before_arcsec: rms(0.0),
         left_after_arcsec: rms(zero),
