@@ -95,7 +95,7 @@ fn misses(trial: Option<&MadeTable>, prior: &Prior<'_>, model: &Model, torque: f
     let mut worst = 0.0_f64;
     for &temperature in temperatures {
         for direction in [Direction::Forward, Direction::Backward] {
-            let sum: f64 = few_places(model.scales.teeth)
+            let sum: f64 = few_places(prior.nominal.ratio, model.scales.teeth)
                 .map(|generator_rad| {
                     let said = GeneratorAngle::from_rad(generator_rad)
                         .and_then(|generator| table.steady_error_rad(generator, torque, temperature, direction))
@@ -178,9 +178,11 @@ fn first_torque_nodes(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> 
     nodes
 }
 
-/// Places spread over the pitch and over the turn.
-fn few_places(teeth: f64) -> impl Iterator<Item = f64> {
-    (0..FEW_PLACES).map(move |k| TAU / teeth * (k as f64 / FEW_PLACES as f64 + 7.0 * k as f64))
+/// Places spread over the pitch and over a turn of the output: the largest error of a table is that of a load at an
+/// angle.
+fn few_places(ratio: f64, teeth: f64) -> impl Iterator<Item = f64> {
+    let pitches = (teeth * ratio.abs() / FEW_PLACES as f64).round();
+    (0..FEW_PLACES).map(move |k| TAU / teeth * (k as f64 / FEW_PLACES as f64 + pitches * k as f64))
 }
 
 /// Steady motion both ways: over a whole turn of the output at one node, at a few places at the others.
@@ -188,7 +190,7 @@ fn samples(prior: &Prior<'_>, model: &Model, teeth: f64, torques: &[f32], temper
     let ratio = prior.nominal.ratio;
     let count = places(ratio, teeth);
     let whole_turn: Vec<f64> = (0..count).map(|k| k as f64 * TAU * ratio.abs() / count as f64).collect();
-    let few: Vec<f64> = few_places(teeth).collect();
+    let few: Vec<f64> = few_places(ratio, teeth).collect();
     let middle = torques.len() / 2;
     let mut samples = Vec::new();
     for (warm, &temperature) in temperatures.iter().enumerate() {
