@@ -242,6 +242,8 @@ pub struct ModelUncertainty {
     parts: Vec<PartName>,
     /// Of what the fit misses in their coefficients, arcsec².
     covariance: Vec<f64>,
+    /// Mean of their columns over the rows: an error that is the same in all of them is the zero of the output.
+    means: Vec<f64>,
     /// Error that stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the
     /// fit.
     of_no_part_arcsec: f64,
@@ -252,10 +254,11 @@ pub struct ModelUncertainty {
 impl ModelUncertainty {
     /// From the rows of the fit, of logs with these delays as numbers of their columns, which `rows` are without unless
     /// the model has them; `coarse_rad` is the step of the resolution at the output, and `left_out_arcsec` what fits
-    /// leave in rows that were left out of them.
+    /// leave in rows that were left out of them. Parts `beside` the model are zero in it, each known to the standard
+    /// deviation given with it, arcsec, before the rows.
     pub(super) fn of(
         rows: &[Row],
-        model: &Model,
+        (model, beside): (&Model, &[(PartName, f64)]),
         delays: &[f64],
         coarse_rad: f64,
         left_out_arcsec: f64,
@@ -273,6 +276,11 @@ impl ModelUncertainty {
             let known = of_part.iter().zip(weights(*part));
             priors.extend(known.map(|(fitted, weight)| before(-fitted, weight / expected, of_a_row)));
         }
+        for (part, arcsec) in beside {
+            parts.push(*part);
+            let weights = weights(*part).into_iter();
+            priors.extend(weights.map(|weight| before(0.0, f64::max(weight, 1.0) / arcsec.powi(2), of_a_row)));
+        }
         if scales.speed_rad_s > 0.0 {
             for (log, delay) in delays.iter().enumerate() {
                 let part = PartName::ReadingDelay(log);
@@ -283,9 +291,12 @@ impl ModelUncertainty {
         }
         let mut groups = vec![Gram::none(priors.len() + 2); logs];
         let mut of_logs: Vec<_> = left.iter().map(|left| left.iter()).collect();
+        let mut means = vec![0.0; priors.len()];
         for at in rows {
             let left = of_logs[at.at.log].next().copied().unwrap_or_default();
-            groups[at.at.log].add_row(&row_of_group(&parts, &at.at, scales, left), 1.0);
+            let row = row_of_group(&parts, &at.at, scales, left);
+            groups[at.at.log].add_row(&row, 1.0);
+            means.iter_mut().zip(&row[1..]).for_each(|(mean, value)| *mean += value / rows.len() as f64);
         }
         let after = after(&groups, &priors)?;
         let off = &after.coefficients;
@@ -293,15 +304,16 @@ impl ModelUncertainty {
         let covariance = after.covariance().iter().zip(pairs).map(|(of_one, pair)| of_a_row * of_one + pair).collect();
         let everywhere = RowNoise { rms_arcsec: noise.rms_arcsec.max(left_out_arcsec), ..noise };
         let of_no_part_arcsec = everywhere.lasting_arcsec();
-        Some(ModelUncertainty { model: model.clone(), parts, covariance, of_no_part_arcsec, noise })
+        Some(ModelUncertainty { model: model.clone(), parts, covariance, means, of_no_part_arcsec, noise })
     }
 
     /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there,
-    /// arcsec, but for one zero of all. At a speed the error is that of its log, which has a delay; without one, that
+    /// arcsec, but for one zero of all, which makes the mean over the rows right. At a speed the error is that of its log, which has a delay; without one, that
     /// of both angles at one instant.
     #[must_use]
     pub fn half_width_arcsec(&self, at: &State) -> f64 {
-        let x = row(&self.parts, at, &self.model.scales);
+        let mut x = row(&self.parts, at, &self.model.scales);
+        x.iter_mut().zip(&self.means).for_each(|(x, mean)| *x -= mean);
         OF_95 * (variance(&self.covariance, &x) + self.of_no_part_arcsec.powi(2)).sqrt()
     }
 

@@ -36,6 +36,7 @@ use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
 use interval::OF_95;
 pub use interval::{ModelUncertainty, Node, RowNoise};
+use parts::usual_arcsec;
 pub use parts::{PartName, Scales, State};
 pub use plan::{Bench, Pass, Planned, Wide, plan};
 pub use prior::Prior;
@@ -91,7 +92,7 @@ const PLAY_COEFFICIENTS: usize = 3;
 const OTHER_PACE: f64 = 1.25;
 /// Correlation of the load with waves of the output from which on they cannot be told apart well: half of the load's
 /// squares. *Guess*.
-const TURNS_WITH_THE_OUTPUT: f64 = 0.7;
+pub(crate) const TURNS_WITH_THE_OUTPUT: f64 = 0.7;
 /// Temperatures closer than this, K, are one.
 const ONE_TEMPERATURE_K: f64 = 2.0;
 
@@ -283,12 +284,22 @@ fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> Vec<State> {
     states.into_iter().map(|at| State { speed_rad_s: at.way * pace, ..at }).collect()
 }
 
-/// Says so where the load goes with the output's angle.
-fn load_with_angle(rows: &Rows, known: &ModelUncertainty) -> Option<String> {
-    let correlation = rows.load_with_output_angle();
+/// Of wind-up and waves of the output, where the load goes with the output's angle, those that a model does not have,
+/// with the size that they may have all the same, arcsec: what was fitted may be theirs, all of it.
+fn collinear(rows: &Rows, model: &Model, correlation: f64) -> Vec<(PartName, f64)> {
+    let both = [PartName::WindUp, PartName::OutputAngle];
+    let fitted = model.chosen.iter().filter(|chosen| both.contains(&chosen.part));
+    let largest = fitted.map(|chosen| size(rows, model, *chosen)).fold(0.0, f64::max);
+    let others = both.into_iter().filter(|part| correlation > TURNS_WITH_THE_OUTPUT && model.of(*part).is_none());
+    others.map(|part| (part, usual_arcsec(part, &model.scales).max(largest))).collect()
+}
+
+/// Says so where the load goes with the output's angle, and the rows tell neither alone as well as both together, to
+/// `as_recorded_arcsec`.
+fn load_with_angle(correlation: f64, known: &ModelUncertainty, as_recorded_arcsec: f64) -> Option<String> {
     let ends = known.nodes().into_iter().filter(|node| node.part == PartName::WindUp.as_str());
     let widest = ends.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
-    (correlation > TURNS_WITH_THE_OUTPUT && widest > 0.0).then(|| {
+    (correlation > TURNS_WITH_THE_OUTPUT && widest > as_recorded_arcsec).then(|| {
         format!(
             "the load goes with the angle of the output (correlation {correlation:.2}), as the weight of an arm does: \
              wind-up and waves of the output are one there, the wind-up alone is known to ±{widest:.0} arcsec, and \
@@ -641,7 +652,9 @@ impl<'a> FittedTable<'a> {
         let none = || vec![0.0; files.len()];
         let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
         let left_out_arcsec = held_out.rms_after_arcsec;
-        let known = ModelUncertainty::of(&rows.rows, &model, &delays, recorded.coarse_rad, left_out_arcsec)
+        let correlation = rows.load_with_output_angle();
+        let beside = collinear(&rows, &model, correlation);
+        let known = ModelUncertainty::of(&rows.rows, (&model, &beside), &delays, recorded.coarse_rad, left_out_arcsec)
             .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
         // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
         // paces that were recorded.
@@ -653,7 +666,7 @@ impl<'a> FittedTable<'a> {
         let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
         let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
         let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
-        notes.extend(load_with_angle(&rows, &known));
+        notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
         let output_zeros = output_zeros(files, &rows, &model, known.noise);
         let offset = |zero: &OutputZero| Reading {
             name: "offset",
