@@ -1,15 +1,19 @@
 //! Rows of a drive of which a model or a table is known, with what the diagnosis says of the sign of their torque and
 //! of angles in degrees, which no ratio shows.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use flexspline::Table;
 
 use crate::diagnosis::channels::{check_degrees, check_torque};
+use crate::least_squares::Normal;
 use crate::measurement::{
-    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Recording, Session, bytes_of, parse_at_least,
+    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Quantity, Recording, Refusal, Session, bytes_of, least_and_most,
+    parse_at_least,
 };
 use crate::nominal::Nominal;
+use flexspline_base::robust::mean;
 
 /// Fewest rows that a table is played over. *Source*: one has no mean to be about.
 pub(crate) const FEW: usize = 2;
@@ -44,17 +48,84 @@ pub fn parse_known(
         return Ok(read);
     }
     check_degrees(&read, columns, nominal, table)?;
-    let mut asked = read.with_sessions(read.sessions.clone());
-    check_torque(&mut asked, nominal, table);
-    for fault in asked.faults {
-        if fault.name == FaultName::TorqueSign {
-            read.sessions.clone_from(&asked.sessions);
-            read.faults.push(fault);
-        } else {
-            read.notes.push(format!("`diagnose` doubts the torque, which stays here: {}", fault.what));
-        }
+    check_waves(&read, columns, nominal.ratio)?;
+    let torques: Vec<_> = read.sessions.iter().map(|session| session.torque_n_m.clone()).collect();
+    let before = read.faults.len();
+    check_torque(&mut read, nominal, table);
+    if read.faults[before..].iter().any(|fault| fault.name != FaultName::TorqueSign) {
+        read.sessions.iter_mut().zip(torques).for_each(|(session, torque)| session.torque_n_m = torque);
+        let doubts = read.faults.drain(before..);
+        let notes = doubts.map(|fault| format!("`diagnose` doubts the torque, which stays here: {}", fault.what));
+        read.notes.extend(notes);
     }
     Ok(read)
+}
+
+/// Waves of the output that are no waves of the generator in degrees: as a table has them.
+const OUTPUT_ORDERS: usize = 6;
+/// Generator turns in degrees that tell waves from drift. *Guess*.
+const MANY_TURNS: f64 = 10.0;
+/// Share of the squares that the waves of the generator take in the reading that is meant, at least, and in the other,
+/// at most. *Guesses*.
+const REPEATS: [f64; 2] = [0.5, 0.1];
+/// Rows that are looked at, about.
+const LOOKED_AT: usize = 20_000;
+
+/// Refuses angles that are in degrees where radians are read, which no ratio shows: the error repeats in each turn of
+/// the generator in degrees and not in radians. A unit that the mapping says is believed.
+fn check_waves(read: &Recording, columns: &ColumnMap, ratio: f64) -> Result<(), MeasuredError> {
+    let (generator, said) = columns.column(Quantity::Generator);
+    let of_degrees = 1f64.to_radians();
+    let angles = || read.sessions.iter().flat_map(|session| session.generator_rad.iter().copied());
+    let (from, to) = least_and_most(angles());
+    if said || (to - from) * of_degrees < MANY_TURNS * TAU {
+        return Ok(());
+    }
+    let every = read.sessions.iter().map(Session::len).sum::<usize>().div_ceil(LOOKED_AT).max(1);
+    let rows = read.sessions.iter().flat_map(|session| {
+        let zero = mean(&session.error_rad);
+        session.states(0.0).zip(&session.error_rad).map(move |([psi, torque, _], error)| [psi, torque, error - zero])
+    });
+    let rows: Vec<[f64; 3]> = rows.step_by(every).collect();
+    let waves = |psi: f64, orders: usize, row: &mut [f64]| {
+        let values = (1..=orders).flat_map(|order| <[f64; 2]>::from((order as f64 * psi).sin_cos()));
+        row.iter_mut().zip(values).for_each(|(place, value)| *place = value);
+    };
+    // Of the generator in radians (1), in degrees, or none.
+    let left = |unit: Option<f64>| {
+        let width = 2 + 2 * OUTPUT_ORDERS + 4 + if unit.is_some() { 4 } else { 0 };
+        let fit = Normal::of(width, rows.len(), |k, row| {
+            let [psi, torque, error] = rows[k];
+            row[1] = torque;
+            waves(psi / ratio, OUTPUT_ORDERS, &mut row[2..]);
+            waves(of_degrees * psi / ratio, 2, &mut row[2 + 2 * OUTPUT_ORDERS..]);
+            if let Some(unit) = unit {
+                waves(unit * psi, 2, &mut row[6 + 2 * OUTPUT_ORDERS..]);
+            }
+            (error, 1.0)
+        })?;
+        Some(fit.sound(rows.len())?.misfit())
+    };
+    let (Some(none), Some(radians), Some(degrees)) = (left(None), left(Some(1.0)), left(Some(of_degrees))) else {
+        return Ok(());
+    };
+    let [in_radians, in_degrees] = [radians, degrees].map(|left| 1.0 - left / none.max(f64::MIN_POSITIVE));
+    if in_degrees < REPEATS[0] || in_radians > REPEATS[1] {
+        return Ok(());
+    }
+    let output = columns.column(Quantity::Output).0;
+    let seen = format!(
+        "{generator}: waves of one and two to 2 pi of it take {:.0} % of the error that loads and the output leave, to \
+         360 of it {:.0} %",
+        100.0 * in_radians,
+        100.0 * in_degrees
+    );
+    let readings = vec![
+        format!("--columns generator={generator}:deg,output={output}:deg"),
+        format!("generator={generator}:rad if they are not"),
+    ];
+    let why = "angles in degrees read as radians";
+    Err(MeasuredError::of_file(&read.file, &Refusal::OtherReading { seen, why, readings }))
 }
 
 #[cfg(test)]
