@@ -28,7 +28,7 @@ use flexspline_identify::diagnosis::{Options, PipelineError, Subject, diagnose_r
 use flexspline_identify::extension::Model;
 use flexspline_identify::look::look;
 use flexspline_identify::measurement::{ColumnMap, parse, raw};
-use flexspline_identify::replay::{parse as parse_measured, replay};
+use flexspline_identify::replay::{read, replay};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 use made::{MODEL, RATIO};
@@ -130,10 +130,10 @@ impl Bench {
             Ok(table) => table,
             Err(error) => return (101, error.to_string()),
         };
-        match parse_measured("log.csv", bytes, table.drive().exact_ratio(), 20.0) {
-            Ok(rows) => {
-                let (replayed, summary) = replay(&table, &rows);
-                let whole = replayed.len() == rows.len() && summary.rows == rows.len();
+        match read("log.csv", bytes, &ColumnMap::default(), &table, 20.0) {
+            Ok(read) => {
+                let (replayed, summary) = replay(&table, &read.rows);
+                let whole = replayed.len() == read.rows.len() && summary.rows == read.rows.len();
                 (if whole { 0 } else { 101 }, "replayed".to_owned())
             }
             Err(error) => (2, error.to_string()),

@@ -1,13 +1,16 @@
-//! Whether the generator zero of measured rows is whole turns off that of a table.
+//! Reasons why a table leaves much of measured rows: the generator's zero is whole turns off, the torque counts the
+//! other way, or the load at each angle is another than when the table was made.
 //!
-//! A table of a drive whose error does not repeat in each turn says another error a turn later. A motor that was homed
+//! A table of a drive whose error does not repeat in each turn holds another error a turn later. A motor that was homed
 //! in another turn reads the same within its turn, and the table adds the error of another place: it may leave more
-//! than there was. The rows show it by the turn at which the table leaves least of them.
+//! than there was. Each reason is held against the rows by what the table would leave with it.
 
 use flexspline::{Prediction, Table};
 use serde::Serialize;
 
 use super::replay::{MeasuredRow, by_core};
+use crate::calibrate::TURNS_WITH_THE_OUTPUT;
+use crate::least_squares::FreeSpan;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Rows that a turn is looked for with, about.
@@ -31,68 +34,89 @@ pub struct TurnsOff {
 }
 
 impl TurnsOff {
-    /// What to know of it, and what to do.
+    /// A reason, and what to do.
     #[must_use]
-    pub fn text(&self, rms_residual_arcsec: f64) -> String {
-        let Self { turns, likely: [fewest, most], rms_residual_arcsec: so } = self;
+    pub fn text(&self) -> String {
+        let Self { turns, likely: [fewest, most], rms_residual_arcsec: left } = self;
         let ahead = if *turns > 0 { "more" } else { "less" };
         let likely =
             if fewest == most { String::new() } else { format!(" ({fewest} to {most} leave about as little)") };
         let off = format!("{}{}", if *turns > 0 { "-" } else { "+" }, turns.abs());
         format!(
             "the motor's zero is off by whole turns: the generator angle reads {} turns {ahead} than that of the \
-             table{likely}; the table leaves {rms_residual_arcsec:.1} arcsec rms as the rows stand, and {so:.1} \
-             without these turns. Home the motor in the turn of the table, or take them off: --columns \
-             generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
+             table{likely}; without these turns {left:.1} arcsec rms would be left. Home the motor in the turn of the \
+             table, or take them off: --columns generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
             turns.abs(),
             -std::f64::consts::TAU * *turns as f64
         )
     }
 }
 
-/// Some of the rows, evenly.
-fn some(rows: &[MeasuredRow]) -> Vec<&MeasuredRow> {
-    rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect()
+/// A sample of the rows with what the table leaves of them.
+pub(crate) struct Misfit<'a> {
+    table: &'a Table<'a>,
+    rows: Vec<&'a MeasuredRow>,
+    /// As the rows stand, arcsec.
+    residual: Vec<f64>,
+    /// A reason has to leave less than this about the mean, arcsec rms: clearly less than the table does as the rows
+    /// stand, and than they have without it. A table that still takes nothing is no table of these rows.
+    most_left: f64,
 }
 
-/// What the table leaves of rows about their mean, arcsec rms, with the generator's zero and the torque's sign changed.
-fn left(table: &Table<'_>, rows: &[&MeasuredRow], off_rad: f64, sign: f64) -> f64 {
+impl<'a> Misfit<'a> {
+    pub(crate) fn of(table: &'a Table<'a>, rows: &'a [MeasuredRow]) -> Misfit<'a> {
+        let rows: Vec<&MeasuredRow> = rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect();
+        let residual = residual(table, &rows, 0.0, 1.0);
+        let measured: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
+        let most_left = LEAVES * about_mean(&residual).min(about_mean(&measured));
+        Misfit { table, rows, residual, most_left }
+    }
+
+    fn clear(&self, left: f64) -> Option<f64> {
+        (left < self.most_left).then_some(left)
+    }
+
+    /// What the table leaves with the torque's sign turned, arcsec rms.
+    pub(crate) fn torque_turned(&self) -> Option<f64> {
+        self.clear(about_mean(&residual(self.table, &self.rows, 0.0, -1.0)))
+    }
+
+    /// What another spring and another first wave of the output would leave of the residual, arcsec rms, where the load
+    /// goes with the output's angle: a table of rows in one posture has the one for the other.
+    pub(crate) fn other_load(&self) -> Option<f64> {
+        let ratio = self.table.drive().exact_ratio();
+        let column = |of: fn(f64) -> f64| self.rows.iter().map(move |row| of(row.generator_rad / ratio)).collect();
+        let torque: Vec<f64> = self.rows.iter().map(|row| row.torque_n_m).collect();
+        let waves: [Vec<f64>; 3] = [column(|_| 1.0), column(f64::sin), column(f64::cos)];
+        let beside = FreeSpan::default().beyond(waves.clone()).freed(torque.clone());
+        let goes_with_angle = about_mean(&beside) < (1.0 - TURNS_WITH_THE_OUTPUT.powi(2)).sqrt() * about_mean(&torque);
+        let span = FreeSpan::default().beyond(waves.into_iter().chain([torque]));
+        self.clear(about_mean(&span.freed(self.residual.clone()))).filter(|_| goes_with_angle)
+    }
+
+    /// The turn at which the table leaves least; `None` if that is the one in which the rows stand, or is not clear.
+    pub(crate) fn turns_off(&self) -> Option<TurnsOff> {
+        let left =
+            |turns: i64| about_mean(&residual(self.table, &self.rows, std::f64::consts::TAU * turns as f64, 1.0));
+        // A turn of the output later the table is the same.
+        let half = (0.5 * self.table.drive().exact_ratio().abs()).ceil() as i64;
+        let all: Vec<(i64, f64)> = (-half..=half).map(|turns| (turns, left(turns))).collect();
+        let (best, least) =
+            all.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.abs().cmp(&b.0.abs())))?;
+        self.clear(least).filter(|_| best != 0)?;
+        let likely = |turns: &i64| all.iter().any(|(other, left)| other == turns && *left <= AS_LIKELY * least);
+        let run = |by: i64| (1..).map(|k| best + by * k).take_while(likely).last().unwrap_or(best);
+        Some(TurnsOff { turns: best, likely: [run(-1), run(1)], rms_residual_arcsec: least })
+    }
+}
+
+/// What the table leaves of rows, arcsec, with the generator's zero and the torque's sign changed.
+fn residual(table: &Table<'_>, rows: &[&MeasuredRow], off_rad: f64, sign: f64) -> Vec<f64> {
     let states = rows.iter().map(|row| [row.generator_rad - off_rad, sign * row.torque_n_m, row.temperature_c]);
     let residual = |(row, said): (&&MeasuredRow, Prediction)| {
         row.error_arcsec - f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD
     };
-    about_mean(&rows.iter().zip(by_core(table, states)).map(residual).collect::<Vec<_>>())
-}
-
-/// What the table leaves of the rows with the torque's sign turned, arcsec rms; `None` unless that is clearly less than
-/// what it leaves of them as they stand, and than they have without it.
-#[must_use]
-pub(crate) fn torque_turned(table: &Table<'_>, rows: &[MeasuredRow]) -> Option<f64> {
-    let some = some(rows);
-    let measured: Vec<f64> = some.iter().map(|row| row.error_arcsec).collect();
-    let [stands, turned] = [1.0, -1.0].map(|sign| left(table, &some, 0.0, sign));
-    (turned < LEAVES * stands.min(about_mean(&measured))).then_some(turned)
-}
-
-/// Looks for the turn at which the table leaves least of the rows; `None` if that is the one in which they stand, or is
-/// not clear.
-#[must_use]
-pub(crate) fn turns_off(table: &Table<'_>, rows: &[MeasuredRow]) -> Option<TurnsOff> {
-    let some = some(rows);
-    let left = |turns: i64| left(table, &some, std::f64::consts::TAU * turns as f64, 1.0);
-    let measured: Vec<f64> = some.iter().map(|row| row.error_arcsec).collect();
-    // A turn of the output later the table is the same.
-    let half = (0.5 * table.drive().exact_ratio().abs()).ceil() as i64;
-    let all: Vec<(i64, f64)> = (-half..=half).map(|turns| (turns, left(turns))).collect();
-    let (best, least) = all.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.abs().cmp(&b.0.abs())))?;
-    let stands = all.iter().find(|(turns, _)| *turns == 0)?.1;
-    // A table that still takes nothing is no table of these rows, wherever they begin.
-    if best == 0 || least >= LEAVES * stands.min(about_mean(&measured)) {
-        return None;
-    }
-    let likely = |turns: &i64| all.iter().any(|(other, left)| other == turns && *left <= AS_LIKELY * least);
-    let run = |by: i64| (1..).map(|k| best + by * k).take_while(likely).last().unwrap_or(best);
-    Some(TurnsOff { turns: best, likely: [run(-1), run(1)], rms_residual_arcsec: least })
+    rows.iter().zip(by_core(table, states)).map(residual).collect()
 }
 
 /// Root mean square about the mean.
@@ -129,8 +153,9 @@ mod tests {
             };
             (0..1500).map(row).collect()
         };
-        assert!(torque_turned(&table, &rows(100.0, -1.0)).is_some_and(|left| left < 1.0));
-        assert_eq!(torque_turned(&table, &rows(100.0, 1.0)), None);
-        assert_eq!(torque_turned(&table, &rows(0.0, -1.0)), None);
+        let torque_turned = |rows: Vec<MeasuredRow>| Misfit::of(&table, &rows).torque_turned();
+        assert!(torque_turned(rows(100.0, -1.0)).is_some_and(|left| left < 1.0));
+        assert_eq!(torque_turned(rows(100.0, 1.0)), None);
+        assert_eq!(torque_turned(rows(0.0, -1.0)), None);
     }
 }

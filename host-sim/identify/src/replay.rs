@@ -11,12 +11,10 @@ use serde_json::Value;
 use thiserror::Error;
 
 use crate::calibrate::check_ratio_of;
-use crate::known_rows::{FEW, parse_known};
-use crate::measurement::{
-    ColumnMap, Fault, FaultName, Gear, MeasuredError, Quantity, Recording, Treatment, parse_at_least,
-};
+use crate::known_rows::parse_known;
+use crate::measurement::{ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment};
 use crate::nominal::Nominal;
-use crate::turns_off::{TurnsOff, about_mean, torque_turned, turns_off};
+use crate::misfit::{Misfit, TurnsOff, about_mean};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::generator_of;
 
@@ -79,6 +77,10 @@ pub struct ReplaySummary {
     pub generator_zero_off: Option<TurnsOff>,
     /// Residual of the table with the torque's sign turned, arcsec rms, where the rows show that it is.
     pub torque_turned_rms_arcsec: Option<f64>,
+    /// Residual of the table with another spring and another wave of the output, arcsec rms, where the load goes with
+    /// the angle of the output and that is clearly less: another posture or payload than those of the table.
+    #[serde(skip)]
+    other_load_rms_arcsec: Option<f64>,
     /// Whose rows they are, where that is known.
     pub rows_of: Option<RowsOf>,
     /// Remarks on them: that they are another drive's, or nobody's.
@@ -155,26 +157,40 @@ impl ReplaySummary {
         self.rows_of = rows_of;
     }
 
-    /// A remark where the table gains less than it could, or nothing.
-    fn of_gain(&self) -> Option<String> {
+    /// Remarks where the table gains less than it could, or nothing: each explanation that the rows allow.
+    fn of_gain(&self) -> Vec<String> {
         let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
-        if let Some(turned) = self.torque_turned_rms_arcsec {
-            return Some(format!(
-                "the torque's sign is turned: the table leaves {left:.1} arcsec rms as the rows stand, and \
-                 {turned:.1} with the other sign; positive is what turns the output forward: --columns \
-                 torque=NAME:-N.m"
-            ));
-        }
-        if let Some(off) = &self.generator_zero_off {
-            return Some(off.text(left));
-        }
-        (left > measured).then(|| {
+        let mut why = Vec::new();
+        why.extend(self.other_load_rms_arcsec.map(|without| {
+            format!(
+                "the load goes with the angle of the output here, and with another spring and another wave of the \
+                 output {without:.1} arcsec rms would be left: the rows may be of another posture or payload than \
+                 those of the table; calibrate on both together"
+            )
+        }));
+        why.extend(self.torque_turned_rms_arcsec.map(|turned| {
+            format!(
+                "the torque's sign is turned: with the other sign {turned:.1} arcsec rms would be left; positive is \
+                 what turns the output forward: --columns torque=NAME:-N.m"
+            )
+        }));
+        why.extend(self.generator_zero_off.as_ref().map(TurnsOff::text));
+        let is_of_unit = "is it the table of this unit, and its generator zero that of the rows?";
+        let nothing = left > measured;
+        let begin = if nothing {
             format!(
                 "the table leaves {left:.1} arcsec rms where the rows have {measured:.1} without it: it gains nothing \
-                 here, and no whole turns of the motor change that; is it the table of this unit, and its generator \
-                 zero that of the rows?"
+                 here, and is worse than none"
             )
-        })
+        } else {
+            format!("the table leaves {left:.1} arcsec rms of {measured:.1}")
+        };
+        match why.as_slice() {
+            [] if nothing => vec![format!("{begin}; neither whole turns of the motor nor the torque explain that; {is_of_unit}")],
+            [] => Vec::new(),
+            [one] => vec![format!("{begin}; {one}")],
+            several => vec![format!("{begin}; these rows allow several reasons: {}", several.join("; or "))],
+        }
     }
 }
 
@@ -215,15 +231,6 @@ pub fn read(
 ) -> Result<RowsRead, MeasuredError> {
     let nominal = Nominal::of_table(table);
     rows_of(parse_known(file, bytes, columns, &nominal, Some(table))?, nominal.ratio, temperature_c)
-}
-
-/// The same by the ratio alone, with this project's own columns.
-///
-/// # Errors
-/// As [`read`].
-pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasuredError> {
-    let recording = parse_at_least(FEW, file, bytes, &ColumnMap::default(), &Gear::of_ratio(ratio))?;
-    rows_of(recording, ratio, temperature_c).map(|read| read.rows)
 }
 
 /// The rows of a recording, if a table can be played over them.
@@ -294,7 +301,7 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
     let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
     let count = replayed.len().max(1) as f64;
     let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
-    let turned = torque_turned(table, rows);
+    let found = Misfit::of(table, rows);
     let mut summary = ReplaySummary {
         schema_version: 1,
         status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
@@ -307,8 +314,9 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
         mean_residual_arcsec: mean_residual,
         rows_by_quality: by_quality,
-        generator_zero_off: if turned.is_none() { turns_off(table, rows) } else { None },
-        torque_turned_rms_arcsec: turned,
+        generator_zero_off: found.turns_off(),
+        torque_turned_rms_arcsec: found.torque_turned(),
+        other_load_rms_arcsec: found.other_load(),
         rows_of: None,
         remarks: Vec::new(),
         data_faults: Vec::new(),
@@ -322,6 +330,14 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::known_rows::FEW;
+    use crate::measurement::{Gear, parse_at_least};
+
+    /// Rows by the ratio alone, with this project's own columns.
+    fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasuredError> {
+        let recording = parse_at_least(FEW, file, bytes, &ColumnMap::default(), &Gear::of_ratio(ratio))?;
+        rows_of(recording, ratio, temperature_c).map(|read| read.rows)
+    }
 
     /// The summary of a run speaks of its results alone, and that of a replay, which may have taken its place, of the
     /// rows replayed.

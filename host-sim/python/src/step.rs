@@ -5,7 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use flexspline::{Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, Table as CoreTable};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{dead_zone_n_m, generator_of};
-use flexspline_identify::replay::{MeasuredRow, RowsOf, parse as parse_measured, replay};
+use flexspline_identify::measurement::ColumnMap;
+use flexspline_identify::replay::{MeasuredRow, RowsOf, RowsRead, read, replay};
 use flexspline_mechanics::drive::GeneratorKind;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
@@ -332,7 +333,7 @@ impl Table {
                 temperature_c: temperature.at(row),
             })
             .collect();
-        self.replayed(py, &rows, None)
+        self.replayed(py, RowsRead { rows, faults: Vec::new(), notes: Vec::new() }, None)
     }
 
     /// The same of a CSV. Rows of a run of another drive are a remark here.
@@ -343,8 +344,8 @@ impl Table {
         temperature_c: f64,
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
         let bytes = std::fs::read(file).map_err(|error| bad(format!("{file}: {error}")))?;
-        let rows = parse_measured(file, &bytes, self.table().drive().exact_ratio(), temperature_c).map_err(bad)?;
-        self.replayed(py, &rows, RowsOf::beside(std::path::Path::new(file), &bytes))
+        let read = read(file, &bytes, &ColumnMap::default(), self.table(), temperature_c).map_err(bad)?;
+        self.replayed(py, read, RowsOf::beside(std::path::Path::new(file), &bytes))
     }
 
     /// Arc-seconds in a radian, as every number here is converted.
@@ -357,10 +358,11 @@ impl Table {
     fn replayed<'py>(
         &self,
         py: Python<'py>,
-        rows: &[MeasuredRow],
+        RowsRead { rows, faults, notes }: RowsRead,
         rows_of: Option<RowsOf>,
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
-        let (replayed, mut summary) = py.detach(|| replay(self.table(), rows));
+        let (replayed, mut summary) = py.detach(|| replay(self.table(), &rows));
+        (summary.data_faults, summary.notes) = (faults, notes);
         summary.of_rows(rows_of, self.table());
         let columns = PyDict::new(py);
         let numbers = |of: fn(&flexspline_identify::replay::ReplayedRow) -> f64| {

@@ -10,7 +10,7 @@ use super::rows::{Recorded, Rows, settled, speeds_rad_s};
 use super::{Model, Prior};
 use crate::extension::left_by_core;
 use crate::measurement::{Recording, Session};
-use crate::turns_off::about_mean;
+use crate::misfit::about_mean;
 use flexspline::Table;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -99,7 +99,7 @@ impl Delays {
             Some(Model { coefficients: folds.coefficients(chosen, &[])?, chosen: chosen.to_vec(), scales })
         };
         let none = vec![0.0; logs];
-        let known = |model: &Model| ModelUncertainty::of(&rows.rows, model, &none, recorded.coarse_rad, 0.0);
+        let known = |model: &Model| ModelUncertainty::of(&rows.rows, (model, &[]), &none, recorded.coarse_rad, 0.0);
         // Of noise as large as the delays make it they would be held back.
         let (_, noise) = left_by(&rows.rows, &model(&chosen)?, logs, recorded.coarse_rad);
         let of_a_row = noise.of_a_row() / rows.rows.len() as f64;
