@@ -11,7 +11,8 @@ use flexspline_identify::diagnosis::{
     Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows, read_rows,
 };
 use flexspline_identify::extension::Model;
-use flexspline_identify::measurement::{ColumnMap, Session, parse, read};
+use flexspline_identify::known_rows::{parse_known, read_known};
+use flexspline_identify::measurement::{ColumnMap, Session};
 use flexspline_mechanics::drive::Drive as MechanicsDrive;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
@@ -76,33 +77,29 @@ pub fn calibrate<'py>(
     let kind = generator(generator_name)?;
     let map = column_map(&reading)?;
     let made = run(py, threads, progress, move |watch| {
-        let image = if let KnownFrom::Image(image) = &known {
-            Some(Table::check(image).map_err(PythonFailure::bad)?)
-        } else {
-            None
-        };
-        let mut extended = None;
-        let prior = match (&image, &known) {
-            (Some(table), _) => Prior::of_table(table, kind),
-            (None, KnownFrom::Model(path)) => {
-                let (prior, model) = Prior::of_file(path, kind).map_err(PythonFailure::bad)?;
-                extended = Some(Subject::of_model(model, MechanicsDrive::hhd_95(), kind));
-                prior
+        let table;
+        let (prior, extended) = match &known {
+            KnownFrom::Image(image) => {
+                table = Table::check(image).map_err(PythonFailure::bad)?;
+                (Prior::of_table(&table, kind), None)
             }
-            (None, KnownFrom::Ratio(ratio)) => Prior::of_given_ratio(*ratio, kind).map_err(PythonFailure::bad)?,
-            (None, KnownFrom::Image(_)) => return Err(PythonFailure::bad("table: no image")),
+            KnownFrom::Model(path) => {
+                let (prior, model) = Prior::of_file(path, kind).map_err(PythonFailure::bad)?;
+                (prior, Some(Subject::of_model(model, MechanicsDrive::hhd_95(), kind)))
+            }
+            KnownFrom::Ratio(ratio) => (Prior::of_given_ratio(*ratio, kind).map_err(PythonFailure::bad)?, None),
         };
-        let gear = prior.nominal.gear();
         let one = |(k, log): (usize, &LogFrom)| {
             watch.tell_or_unwind(k, logs.len() + 1, format!("reading {}", log.name()));
             match log {
-                LogFrom::File(path) => read(path, &map, &gear),
-                LogFrom::Memory((name, bytes)) => parse(name, &bytes[..], &map, &gear),
+                LogFrom::File(path) => read_known(path, &map, &prior.nominal, prior.table),
+                LogFrom::Memory((name, bytes)) => parse_known(name, bytes, &map, &prior.nominal, prior.table),
             }
             .map_err(PythonFailure::bad)
         };
-        let files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, PythonFailure>>()?;
-        let causes = extended.map_or(Ok(None), |subject| subject.known_table(&files)).map_err(PythonFailure::bad)?;
+        let mut files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, PythonFailure>>()?;
+        let causes = extended.map_or(Ok(None), |subject| subject.known_before(&mut files));
+        let causes = causes.map_err(PythonFailure::bad)?;
         let causes = causes.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PythonFailure::bad)?;
         let prior = causes.as_ref().map_or(prior, |table| Prior::of_table(table, kind));
         watch.tell_or_unwind(logs.len(), logs.len() + 1, "fitting".to_owned());

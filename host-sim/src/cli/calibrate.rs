@@ -132,7 +132,7 @@ impl Calibrate {
         let map = self.columns.map()?;
         let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
         let table = image.as_ref().map(|(file, bytes)| table_of(file, bytes)).transpose()?;
-        let prior = self.prior(table.as_ref())?;
+        let (prior, model) = self.prior(table.as_ref())?;
         if self.plan {
             return self.write_plan(context, &prior);
         }
@@ -141,8 +141,10 @@ impl Calibrate {
             .iter()
             .map(|file| read_known(file, &map, &prior.nominal, prior.table))
             .collect::<Result<Vec<_>, _>>();
-        let files = files.map_err(bad_input)?;
-        let known = self.known_table(context, &files)?;
+        let mut files = files.map_err(bad_input)?;
+        let subject = |model| Ok(Subject::of_model(model, context.drive()?, self.generator));
+        let subject: Option<Subject<'_>> = model.map(subject).transpose()?;
+        let known = subject.map_or(Ok(None), |subject| subject.known_before(&mut files)).map_err(bad_input)?;
         let known = known.as_ref().map(|made| table_of(Path::new("drive-extended"), &made.image)).transpose()?;
         let prior = known.as_ref().map_or(prior, |known| Prior::of_table(known, self.generator));
         let out = if self.more { context.out_for_plan(PLAN_BEGINS)? } else { context.out()? };
@@ -207,22 +209,16 @@ impl Calibrate {
         if error.is_bad_input() { Failure::BadInput(what) } else { Failure::Failed(what) }
     }
 
-    fn prior<'t>(&self, table: Option<&'t Table<'t>>) -> Result<Prior<'t>, Failure> {
+    /// The starting point, with the model where it is one.
+    fn prior<'t>(&self, table: Option<&'t Table<'t>>) -> Result<(Prior<'t>, Option<Model>), Failure> {
         if let Some(table) = table {
-            return Ok(Prior::of_table(table, self.generator));
+            return Ok((Prior::of_table(table, self.generator), None));
         }
         if let Some(path) = &self.model {
-            return Prior::of_file(path, self.generator).map(|(prior, _)| prior).map_err(bad_input);
+            return Prior::of_file(path, self.generator).map(|(prior, model)| (prior, Some(model))).map_err(bad_input);
         }
-        Prior::of_given_ratio(self.ratio.unwrap_or_default(), self.generator).map_err(bad_input)
-    }
-
-    /// The table of a model that holds causes, over what the logs hold: the starting point in its place.
-    fn known_table(&self, context: &Context, files: &[Recording]) -> Result<Option<MadeTable>, Failure> {
-        let Some(path) = &self.model else { return Ok(None) };
-        let model = Model::read(path).map_err(bad_input)?;
-        let made = Subject::of_model(model, context.drive()?, self.generator).known_table(files);
-        made.map_err(bad_file(path))
+        let prior = Prior::of_given_ratio(self.ratio.unwrap_or_default(), self.generator);
+        prior.map(|prior| (prior, None)).map_err(bad_input)
     }
 
     /// How the table is tried on another log.

@@ -47,8 +47,7 @@ impl<'a> Prior<'a> {
     /// # Errors
     /// The file cannot be read.
     pub fn of_file(path: &Path, kind: GeneratorKind) -> Result<(Prior<'a>, Model), DriveError> {
-        let model = Model::read(path)?;
-        let hash = *blake3::hash(&std::fs::read(path).unwrap_or_default()).as_bytes();
+        let (model, hash) = Model::read_hashed(path)?;
         let known = Prior::of_nominal(model.nominal.clone(), &path.display().to_string(), kind);
         Ok((Prior { hash, ..known }, model))
     }

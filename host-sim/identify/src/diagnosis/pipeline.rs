@@ -129,8 +129,8 @@ impl PipelineError {
     }
 }
 
-/// A model that holds causes, and what these add to the error of each row of each session, arcsec.
-type Known<'a> = (&'a Model, Vec<Vec<f64>>);
+/// Names of causes that a model holds, and what these add to the error of each row of each session, arcsec.
+type Known = Option<(String, Vec<Vec<f64>>)>;
 
 /// What measured rows are held against: a catalogue's model, or a table made by FEM; and the drive.
 pub struct Subject<'a> {
@@ -191,10 +191,9 @@ impl<'a> Subject<'a> {
 
     /// Takes what the model says of causes known before from the errors.
     fn take_away_known(&self, recording: &mut Recording) -> Result<(), PipelineError> {
-        let Some((model, added)) = self.known_arcsec(recording)? else { return Ok(()) };
+        let Some((names, added)) = self.known_arcsec(recording, |_| true)? else { return Ok(()) };
         less(&mut recording.sessions, added.iter());
-        let names: Vec<&str> = model.causes.iter().map(|cause| cause.name.as_str()).collect();
-        recording.notes.push(format!("the model holds {} already; what is found is beyond that", names.join(", ")));
+        recording.notes.push(format!("the model holds {names} already; what is found is beyond that"));
         Ok(())
     }
 
@@ -210,27 +209,50 @@ impl<'a> Subject<'a> {
         self.model.as_ref().filter(|model| !model.causes.is_empty())
     }
 
-    /// What that model's causes add to the error of each session, arcsec.
-    fn known_arcsec(&self, recording: &Recording) -> Result<Option<Known<'_>>, PipelineError> {
-        let added = |model: &Model| model.added_arcsec(&recording.sessions, self.sizes());
-        let added = self.extended().map(|model| added(model).map(|added| (model, added)));
-        added.transpose().map_err(PipelineError::Known)
+    /// What those of that model's causes that are `wanted` add to the error of each session, arcsec, with their names.
+    fn known_arcsec(&self, recording: &Recording, wanted: fn(&CauseEntry) -> bool) -> Result<Known, PipelineError> {
+        let Some(mut model) = self.extended().cloned() else { return Ok(None) };
+        model.causes.retain(wanted);
+        if model.causes.is_empty() {
+            return Ok(None);
+        }
+        let added = model.added_arcsec(&recording.sessions, self.sizes()).map_err(PipelineError::Known)?;
+        let names: Vec<&str> = model.causes.iter().map(|cause| cause.name.as_str()).collect();
+        Ok(Some((names.join(", "), added)))
     }
 
-    /// Rows as they were measured, what was known before among their errors.
+    /// Rows as they were measured, what was known before among their errors, but for errors of the output's encoder.
     fn as_measured(&self, recording: &Recording) -> Result<Option<Recording>, PipelineError> {
-        let Some((_, mut added)) = self.known_arcsec(recording)? else { return Ok(None) };
+        let of_the_joint = |cause: &CauseEntry| !cause.of_output_encoder();
+        let Some((_, mut added)) = self.known_arcsec(recording, of_the_joint)? else { return Ok(None) };
         added.iter_mut().flatten().for_each(|added| *added = -*added);
         let mut recording = recording.clone();
         less(&mut recording.sessions, added.iter());
         Ok(Some(recording))
     }
 
+    /// The table of a model that holds causes, for a calibration of these recordings to begin with; none of another.
+    /// Errors of the output's encoder, which has no place in a table, are taken from the recordings, and noted.
+    ///
+    /// # Errors
+    /// It makes no table, or does not fit the recordings.
+    pub fn known_before(&self, files: &mut [Recording]) -> Result<Option<MadeTable>, PipelineError> {
+        for file in &mut *files {
+            let Some((names, added)) = self.known_arcsec(file, CauseEntry::of_output_encoder)? else { continue };
+            less(&mut file.sessions, added.iter());
+            file.notes.push(format!(
+                "{}: the model's {names} is taken from the rows and not in the table: {OF_THE_OUTPUT_ENCODER}",
+                file.file
+            ));
+        }
+        self.known_table(files)
+    }
+
     /// The table of a model that holds causes, over the loads and temperatures of these recordings; none of another.
     ///
     /// # Errors
     /// It makes no table.
-    pub fn known_table(&self, files: &[Recording]) -> Result<Option<MadeTable>, PipelineError> {
+    fn known_table(&self, files: &[Recording]) -> Result<Option<MadeTable>, PipelineError> {
         let made = |_| tables_of(self, &self.table_subject(), files).nominal(None);
         self.extended().map(made).transpose()
     }

@@ -20,7 +20,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::causes::{CauseName, ParameterName as Name};
+use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::candidate::LawUnits;
 use crate::diagnosis::prepare::Jump;
@@ -43,6 +43,22 @@ pub struct CauseEntry {
     pub fit: Option<FittedLaw>,
 }
 
+impl CauseEntry {
+    /// Whether it is of the encoder at the output, where it may be of either encoder.
+    pub(crate) fn at_output(&self) -> bool {
+        self.parameters.get(Name::Encoder.as_str()) == Some(&1.0)
+    }
+
+    /// Whether the output's encoder is wrong, and not the joint.
+    pub(crate) fn of_output_encoder(&self) -> bool {
+        match self.name.spec().in_table {
+            InTable::Yes => self.at_output(),
+            InTable::No(why) => why == OF_THE_OUTPUT_ENCODER,
+            InTable::AtOneOrientation => false,
+        }
+    }
+}
+
 /// A nominal model with causes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
@@ -58,12 +74,20 @@ impl Model {
     /// # Errors
     /// The file cannot be read; or every problem found, as [`Nominal::from_toml`] names them.
     pub fn read(path: &Path) -> Result<Model, DriveError> {
+        Model::read_hashed(path).map(|(model, _)| model)
+    }
+
+    /// The same with the BLAKE3 of the file.
+    ///
+    /// # Errors
+    /// As [`Model::read`].
+    pub(crate) fn read_hashed(path: &Path) -> Result<(Model, [u8; 32]), DriveError> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|error| {
             let problem = Problem { place: file.clone(), field: String::new(), what: error.to_string() };
             DriveError { problems: vec![problem] }
         })?;
-        Model::from_toml(&file, &text)
+        Ok((Model::from_toml(&file, &text)?, *blake3::hash(text.as_bytes()).as_bytes()))
     }
 
     /// The model in the text of such a file.

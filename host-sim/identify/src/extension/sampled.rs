@@ -150,8 +150,7 @@ impl ExtendedTables<'_> {
     fn known_arcsec(&self, sessions: &[Session]) -> Result<Vec<Vec<f64>>, PipelineError> {
         let Some((model, sizes)) = self.known else { return Ok(vec![Vec::new(); sessions.len()]) };
         let mut model = model.clone();
-        let at_output = |cause: &CauseEntry| cause.parameters.get(ParameterName::Encoder.as_str()) == Some(&1.0);
-        model.causes.retain(|cause| self.left_out(cause.name, at_output(cause)).is_none());
+        model.causes.retain(|cause| self.left_out(cause.name, cause.at_output()).is_none());
         model.added_arcsec(sessions, sizes).map_err(PipelineError::Known)
     }
 
