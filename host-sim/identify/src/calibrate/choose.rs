@@ -26,23 +26,6 @@ pub(super) fn path(folds: &Folds, of: &[usize]) -> Vec<Vec<Chosen>> {
     all
 }
 
-/// Without the parts that others, chosen later, have made needless.
-pub(super) fn pruned(folds: &Folds, of: &[usize], mut chosen: Vec<Chosen>) -> Vec<Chosen> {
-    let mut left = folds.left_out(of, &chosen);
-    let mut place = 0;
-    while place < chosen.len() {
-        let mut others = chosen.clone();
-        others.remove(place);
-        let without = folds.left_out(of, &others);
-        if without * (1.0 - LEAST_GAIN) <= left {
-            (chosen, left) = (others, without);
-        } else {
-            place += 1;
-        }
-    }
-    chosen
-}
-
 /// The part, with its penalty, that leaves least beside those chosen.
 pub(super) fn best_next(folds: &Folds, of: &[usize], chosen: &[Chosen]) -> Option<(Chosen, f64)> {
     let open = folds.parts.iter().filter(|part| chosen.iter().all(|chosen| chosen.part != **part));
@@ -82,7 +65,7 @@ pub(super) fn nested(folds: &Folds) -> Vec<f64> {
         let mut last = 0.0;
         for (most, left) in left.iter_mut().enumerate() {
             if let Some(chosen) = path.get(most) {
-                last = folds.left_in(*fold, &others, &pruned(folds, &others, chosen.clone()));
+                last = folds.left_in(*fold, &others, chosen);
             }
             *left += last;
         }

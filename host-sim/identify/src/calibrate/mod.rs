@@ -30,7 +30,7 @@ use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
 pub(crate) use choose::LEAST_GAIN;
-use choose::{best_penalty, nested, path, pruned};
+use choose::{best_penalty, nested, path};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
@@ -170,13 +170,6 @@ impl Model {
         let at = self.chosen.iter().position(|chosen| chosen.part == part)?;
         let begin = self.chosen[..at].iter().map(|chosen| width(chosen.part)).sum();
         Some(begin..begin + width(part))
-    }
-
-    /// The whole play that it has at most beside the prior's, arcsec.
-    fn play_arcsec(&self) -> f64 {
-        let Some(play) = self.of(PartName::Play).map(|play| &self.coefficients[play]) else { return 0.0 };
-        // Without load both the lag and the flank go by direction; under load the lag alone.
-        2.0 * [play[0] + play[2], play[0], play[1]].into_iter().fold(0.0, f64::max)
     }
 
     /// Error at rest in one place under a load, arcsec.
@@ -529,7 +522,7 @@ fn from_logs<T>(
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
-    let delays = Delays::of(files, &rows, prior, &recorded, play_rad);
+    let delays = Delays::of(rows.clone(), prior, &recorded);
     let at_one_instant = delays.as_ref().map(|delays| delays.taken_out(files, prior.nominal.ratio));
     if let Some(files) = &at_one_instant {
         rows = settled(files, prior, &recorded, play_rad);
@@ -594,7 +587,7 @@ impl<'a> FittedTable<'a> {
         };
         let (prior, files) = (&aligned, logs.at_one_instant);
         let fitted_without = |without: &[Without]| {
-            let fitted = fit_outside_play(files, prior, (rows.clone(), &recorded), without)?;
+            let fitted = fit(rows.clone().less(prior), prior, &recorded, without)?;
             fitted.is_worth_a_table(&recorded, prior, files).map(|()| fitted)
         };
         let fitted = fitted_without(&[])?;
@@ -745,12 +738,10 @@ fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Record
         let larger = own.max(usual);
         return (less(rows, larger), larger);
     }
-    // A row on a flank that the noise of its torque has drawn would move the mean of its file, and with it all others.
-    let sure = rows.clone().sure(own, recorded).sure(usual, recorded);
     let noise = CLEAR_OF_NOISE * recorded.torque_noise_n_m;
     let between = own + noise..usual - noise;
     let left = |friction_n_m: f64| -> Vec<f64> {
-        let rows = less(sure.clone(), friction_n_m).rows.into_iter();
+        let rows = less(rows.clone(), friction_n_m).rows.into_iter();
         rows.filter(|row| between.contains(&row.at.torque_n_m.abs())).map(|row| row.left_arcsec.powi(2)).collect()
     };
     let (by_own, by_usual) = (left(own), left(usual));
@@ -882,23 +873,6 @@ impl Fitted {
     }
 }
 
-/// Fits, and where a play was found, again without the rows inside it.
-fn fit_outside_play(
-    files: &[Recording],
-    prior: &Prior<'_>,
-    (rows, recorded): (Rows, &Recorded),
-    without: &[Without],
-) -> Result<Fitted, CalibrationError> {
-    let ready = |rows: Rows| rows.sure(recorded.scales.friction_n_m, recorded).less(prior);
-    let fitted = fit(ready(rows), prior, recorded, without)?;
-    let found_rad = fitted.model.play_arcsec() / ARCSEC_PER_RAD;
-    if found_rad <= 0.0 {
-        return Ok(fitted);
-    }
-    let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD + found_rad;
-    fit(ready(settled(files, prior, recorded, play_rad)), prior, recorded, without)
-}
-
 /// Chooses and fits parts to the rows that are outside of a play.
 fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) -> Result<Fitted, CalibrationError> {
     if rows.rows.len() < FEWEST_ROWS {
@@ -915,7 +889,7 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
         let path = path(&folds, &all);
         // The fewest parts that leave least where neither choice nor fit was made.
         let most = (0..path.len()).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
-        let chosen = pruned(&folds, &all, path[most].clone());
+        let chosen = path[most].clone();
         let coefficients = folds.coefficients(&chosen, &[]).unwrap_or_default();
         let mut model = Model { chosen, coefficients, scales: recorded.scales };
         let prior_half_arcsec = 0.5 * prior.nominal.backlash_arcsec;

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
+use super::choose::{LEAST_GAIN, PENALTIES, path};
 use super::folds::{Chosen, Row};
 use super::interval::{ModelUncertainty, OF_95, left_by};
 use super::parts::{PartName, Scales, expected_arcsec};
-use super::rows::{Recorded, Rows, settled, speeds_rad_s};
+use super::rows::{Recorded, Rows, speeds_rad_s};
 use super::{Model, Prior};
 use crate::extension::left_by_core;
 use crate::measurement::{Recording, Session};
@@ -51,36 +51,18 @@ pub struct ReadingDelay {
 pub(super) struct Delays(Vec<Option<[f64; 2]>>);
 
 impl Delays {
-    /// The delays, if they tell what was left out better than play and all other parts do; `rows` of the files lie
-    /// outside of a play of `play_rad`, and what tells the delays outside of that which is found, too.
-    pub(crate) fn of(
-        files: &[Recording],
-        rows: &Rows,
-        prior: &Prior<'_>,
-        recorded: &Recorded,
-        play_rad: f64,
-    ) -> Option<Delays> {
+    /// The delays, if rows that were left out are fitted better with them than with play and all other parts alone.
+    pub(crate) fn of(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Option<Delays> {
         if recorded.scales.speed_rad_s <= 0.0 {
             return None;
         }
-        let (found, model) = Delays::beside(rows.clone(), prior, recorded)?;
-        let further_rad = model.play_arcsec() / ARCSEC_PER_RAD;
-        if further_rad <= 0.0 {
-            return Some(found);
-        }
-        // Now that the play is known, without the rows inside it.
-        Delays::beside(settled(files, prior, recorded, play_rad + further_rad), prior, recorded).map(|(found, _)| found)
-    }
-
-    /// The delays beside the parts of these rows, with those parts.
-    fn beside(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Option<(Delays, Model)> {
-        let rows = rows.sure(recorded.scales.friction_n_m, recorded).less(prior).in_blocks();
+        let rows = rows.in_blocks();
         let (logs, scales) = (rows.means_arcsec.len(), recorded.scales);
         let delays: Vec<PartName> = (0..logs).map(PartName::ReadingDelay).collect();
         let parts = recorded.shown(PartName::ALL.into_iter().chain(delays.iter().copied()), prior);
         let folds = rows.folds_of(&parts, &scales);
         let all = folds.all();
-        let gainful = pruned(&folds, &all, path(&folds, &all).pop()?);
+        let gainful = path(&folds, &all).pop()?;
         // Play goes nearly as a delay does: it is there, or the delay would take it up, and where the two oppose each
         // other neither gains alone. What rows do not tell apart is shared as either is to be expected. At one pace all
         // is play, but an output that leads: no play does that.
@@ -138,7 +120,7 @@ impl Delays {
             let std_s = known.std_of_delay(log)? * s_of_arcsec;
             Some([by * s_of_arcsec, if hidden { std_s.hypot(scales.late_s) } else { std_s }])
         });
-        Some((Delays(found.collect()), model))
+        Some(Delays(found.collect()))
     }
 
     /// Logs with both angles as they are at one instant.

@@ -28,9 +28,6 @@ const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by this multiple of the play.
 const SETTLED: f64 = 1.5;
 
-/// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it.
-const SURE: f64 = 3.0;
-
 /// How the folds were made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FoldKind {
@@ -369,15 +366,6 @@ impl Rows {
     /// Sums over their folds.
     pub(crate) fn folds_of(&self, parts: &[PartName], scales: &Scales) -> Folds {
         Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.folds == FoldKind::Files)
-    }
-
-    /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from
-    /// `friction_n_m` on decide it.
-    pub(crate) fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
-        let all = self.rows.len();
-        self.rows.retain(|row| (row.at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m);
-        self.unsettled += all - self.rows.len();
-        self
     }
 
     /// With what a prior says taken off what was measured, and the mean of each file off that.
