@@ -108,7 +108,7 @@ pub struct State {
 }
 
 /// Scales of the columns.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Scales {
     /// Least and largest torque recorded, N·m.
     pub torque_n_m: [f64; 2],

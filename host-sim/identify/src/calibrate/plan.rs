@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::interval::{Node, OF_95, RowNoise, planned_covariance, row, row_of_group, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
-use super::rows::{MOST_ROWS, late_s};
+use super::rows::{MOST_ROWS, Recorded, late_s};
 use super::{
     Calibrated, CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH,
 };
@@ -237,7 +237,9 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         unrecorded: 0,
     };
     let ratio = prior.nominal.ratio;
-    let (mut chosen, mut cannot) = open_parts(prior, bench, &scales);
+    let recorded = recordable(prior, bench, scales);
+    let mut chosen = recorded.shown(PartName::ALL, prior);
+    let mut cannot: Vec<String> = PartName::ALL.iter().filter_map(|part| lacks(*part, &recorded, prior)).collect();
     let warmths = temperatures(bench).len();
     let files = first.map_or(0, |first| first.calibration.files.len());
     chosen.extend((0..warmths + files).map(PartName::ReadingDelay));
@@ -307,30 +309,17 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let nodes = widths(&chosen, &scales, &now, None);
     let rms = |covariance: &[f64]| asked.mean_variance(covariance).sqrt();
     let mut widest = Vec::new();
-    if let Some(first) = first {
-        let mut then = widths(&chosen, &scales, &at_first, None);
-        // What the calibration says of a node is said here as well.
-        let same = |node: &Node, other: &Node| {
-            node.part == other.part && node.of == other.of && (node.at - other.at).abs() <= 1e-6 * node.at.abs()
-        };
-        for node in &mut then {
-            if let Some(known) = first.calibration.nodes.iter().find(|known| same(node, known)) {
-                node.half_width_arcsec = known.half_width_arcsec;
-            }
-        }
-        let mut order: Vec<usize> = (0..then.len()).collect();
-        order.sort_by(|a, b| then[*b].half_width_arcsec.total_cmp(&then[*a].half_width_arcsec));
-        widest = order
-            .into_iter()
-            .take(WIDEST)
-            .map(|k| Wide {
-                part: then[k].part,
-                of: then[k].of,
-                at: then[k].at,
-                half_width_arcsec: Some(then[k].half_width_arcsec).filter(|half| *half < NOT_RECORDED_ARCSEC),
-                expected_arcsec: nodes[k].half_width_arcsec.min(then[k].half_width_arcsec),
-            })
-            .collect();
+    if first.is_some() {
+        let then = widths(&chosen, &scales, &at_first, None);
+        let mut pairs: Vec<(&Node, &Node)> = then.iter().zip(&nodes).collect();
+        pairs.sort_by(|a, b| b.0.half_width_arcsec.total_cmp(&a.0.half_width_arcsec));
+        widest.extend(pairs.into_iter().take(WIDEST).map(|(then, node)| Wide {
+            part: then.part,
+            of: then.of,
+            at: then.at,
+            half_width_arcsec: Some(then.half_width_arcsec).filter(|half| *half < NOT_RECORDED_ARCSEC),
+            expected_arcsec: node.half_width_arcsec.min(then.half_width_arcsec),
+        }));
     }
     let passes = in_order(taken);
     if chosen.contains(&PartName::WindUp) {
@@ -439,40 +428,31 @@ impl Asked {
     }
 }
 
-/// Parts that this bench can tell, and why it cannot tell the others.
-fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartName>, Vec<String>) {
+/// What a bench can record in all the time there is.
+fn recordable(prior: &Prior<'_>, bench: &Bench, scales: Scales) -> Recorded {
     let turns = (bench.output_deg[1] - bench.output_deg[0]) / 360.0;
     let generator_turns = turns * prior.nominal.ratio.abs();
-    let turns_to_tell = super::turns_to_tell_wheels(prior.nominal.ratio);
-    let lacks = |part: PartName| match part {
-        PartName::WindUp if scales.torque_n_m[1] <= scales.torque_n_m[0] => {
-            Some("the load cannot be changed: give its range, --load-n-m LOW,HIGH".to_owned())
-        }
-        PartName::GeneratorAngle if generator_turns < super::MOST_OF_A_TURN => {
-            Some(format!("the travel is {generator_turns:.2} generator turns"))
-        }
-        PartName::MaterialAngle if generator_turns < turns_to_tell => Some(format!(
-            "the travel is {generator_turns:.1} generator turns; {turns_to_tell} tell it from the generator angle"
-        )),
-        PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
-            Some("the teeth are not known, the ratio alone is".to_owned())
-        }
-        PartName::OutputAngle if turns < super::PERIOD_OF_THE_OUTPUT => {
-            Some(format!("the travel is {turns:.2} output turns"))
-        }
-        PartName::Temperature if scales.temperature_c[1] - scales.temperature_c[0] < ONE_TEMPERATURE_K => {
-            Some("one temperature: give the range, --temperatures-c LOW,HIGH".to_owned())
-        }
-        _ => None,
-    };
-    let (mut open, mut cannot) = (Vec::new(), Vec::new());
-    for part in PartName::ALL {
-        match lacks(part) {
-            Some(why) => cannot.push(format!("{}: {why}", part.as_str())),
-            None => open.push(part),
-        }
+    Recorded {
+        scales,
+        has_torque: true,
+        has_temperature: true,
+        generator_share: generator_turns.min(1.0),
+        output_share: turns.min(1.0),
+        generator_turns,
+        backward_share: 0.5,
+        fine_turns: SLOW_TURNS,
+        ..Recorded::default()
     }
-    (open, cannot)
+}
+
+/// Why a bench cannot tell a part, and the option that changes it.
+fn lacks(part: PartName, recorded: &Recorded, prior: &Prior<'_>) -> Option<String> {
+    let option = match part {
+        PartName::WindUp => ": give the range of the load, --load-n-m LOW,HIGH",
+        PartName::Temperature => ": give the range, --temperatures-c LOW,HIGH",
+        _ => "",
+    };
+    recorded.lacks(part, prior).map(|why| format!("{}: {why}{option}", part.as_str()))
 }
 
 /// Temperatures that are recorded.
@@ -582,33 +562,6 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
         }
     }
     all
-}
-
-impl Planned {
-    /// The passes as a table for whoever programs the bench.
-    #[must_use]
-    pub fn csv(&self) -> String {
-        let mut text = "log,begin_s,duration_s,from_output_deg,to_output_deg,from_generator_turn,to_generator_turn,\
-                        speed_rpm,torque_n_m,temperature_c,tells\n"
-            .to_owned();
-        for p in &self.passes {
-            text += &format!(
-                "{},{:.1},{:.1},{:.3},{:.3},{:.3},{:.3},{:.2},{:.3},{:.1},{}\n",
-                p.log,
-                p.begin_s,
-                p.duration_s,
-                p.from_output_deg,
-                p.to_output_deg,
-                p.from_generator_turn,
-                p.to_generator_turn,
-                p.speed_rpm,
-                p.torque_n_m,
-                p.temperature_c,
-                p.tells.as_str()
-            );
-        }
-        text
-    }
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ pub(super) struct Rows {
 }
 
 /// States that the files have recorded.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Recorded {
     pub scales: Scales,
     pub has_torque: bool,
