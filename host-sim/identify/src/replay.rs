@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::check_ratio_of;
+use crate::calibrate::{CalibrationError, check_ratio_of};
 use crate::known_rows::parse_known;
 use crate::measurement::{ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment};
 use crate::nominal::Nominal;
@@ -244,7 +244,10 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
     if let Some(fault) = recording.faults.iter().find(in_other_unit) {
         return Err(refuse(Some(fault.first_line), fault.what.clone()));
     }
-    let said = check_ratio_of(&recording, ratio).map_err(|other| refuse(None, other.to_string()))?;
+    let said = check_ratio_of(&recording, ratio).map_err(|error| match error {
+        CalibrationError::Ratio { other, .. } => refuse(None, other.to_string()),
+        other => refuse(None, other.to_string()),
+    })?;
     recording.notes.extend(said);
     if recording.sessions.iter().all(|session| session.torque_n_m.is_none()) {
         recording.notes.push("no torque: the table is read at 0 N.m".to_owned());

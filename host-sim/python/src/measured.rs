@@ -118,10 +118,7 @@ pub fn calibrate<'py>(
 
 fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> PythonFailure {
     let names: Vec<String> = logs.iter().map(LogFrom::name).collect();
-    let what = match error {
-        CalibrationError::Measured(_) | CalibrationError::Known(_) => error.to_string(),
-        _ => format!("{}: {error}", names.join(", ")),
-    };
+    let what = error.of_files(&names);
     match error {
         CalibrationError::NothingGained(_) => PythonFailure::NothingGained(what),
         _ => PythonFailure::of(what, error.is_bad_input()),

@@ -200,12 +200,7 @@ impl Calibrate {
     /// The failure, with the files where the error does not name one.
     fn failed(&self, error: &CalibrationError) -> Failure {
         let files: Vec<String> = self.logs.iter().map(|file| file.display().to_string()).collect();
-        let what = match error {
-            CalibrationError::Measured(_) | CalibrationError::Known(_) | CalibrationError::Ratio { .. } => {
-                error.to_string()
-            }
-            _ => format!("{}: {error}", files.join(", ")),
-        };
+        let what = error.of_files(&files);
         if error.is_bad_input() { Failure::BadInput(what) } else { Failure::Failed(what) }
     }
 
@@ -238,7 +233,7 @@ struct CalibrationReport<'a> {
 }
 
 fn put_plan(planned: &Planned, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
-    outputs.file(&out.join("plan.csv"), |file| file.write_all(planned.csv().as_bytes()))?;
+    outputs.csv(&out.join("plan.csv"), &planned.passes)?;
     outputs.json(&out.join("plan.json"), planned)?;
     Ok(())
 }

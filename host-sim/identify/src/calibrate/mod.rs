@@ -79,9 +79,6 @@ const FINE_TURNS: f64 = 1.0;
 /// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number
 /// does, nothing is left.
 const OTHER_RATIO: f64 = 0.25;
-/// Error by a wrong ratio in one of several logs, at least, rad rms: a load that grows over a short log looks the same.
-/// A guess: 15 arc-minutes, where wind-up and clearance are a few.
-const LEAST_OF_OTHER_RATIO_RAD: f64 = 0.0044;
 /// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
 const MOST_ERROR_RAD: f64 = 0.0175;
 /// Arcsec that are taken for rounding.
@@ -108,7 +105,7 @@ pub enum CalibrationError {
     /// The rows turn by another ratio.
     #[error("{file}: {other}")]
     Ratio {
-        /// The file, or all of them.
+        /// The file.
         file: String,
         /// Both ratios.
         other: OtherRatio,
@@ -134,6 +131,17 @@ impl CalibrationError {
         use TableError::Project;
         use WriteError::Refused;
         matches!(self, CalibrationError::Table(Project(Write(Refused(ImageError::Falls { .. })))))
+    }
+
+    /// The error, with the files that it is of.
+    #[must_use]
+    pub fn of_files(&self, files: &[String]) -> String {
+        match self {
+            CalibrationError::Measured(_) | CalibrationError::Known(_) | CalibrationError::Ratio { .. } => {
+                self.to_string()
+            }
+            _ => format!("{}: {self}", files.join(", ")),
+        }
     }
 
     /// Whether the input is to blame.
@@ -402,27 +410,11 @@ pub struct OtherRatio {
     error_rad: f64,
 }
 
-/// Refuses a ratio that the rows contradict, all of them or those of one file; says where they doubt it.
-fn check_ratio(files: &[Recording], ratio: f64) -> Result<Option<String>, CalibrationError> {
-    let all = OtherRatio::of(files, ratio);
-    if let Some(other) = all.filter(OtherRatio::is_far) {
-        let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
-        return Err(CalibrationError::Ratio { file: names.join(", "), other });
-    }
-    for file in files.iter().filter(|_| files.len() > 1 && all.is_none()) {
-        let other = OtherRatio::of(std::slice::from_ref(file), ratio);
-        if let Some(other) = other.filter(|other| other.error_rad >= LEAST_OF_OTHER_RATIO_RAD) {
-            return Err(CalibrationError::Ratio { file: file.file.clone(), other });
-        }
-    }
-    Ok(all.map(|other| other.to_string()))
-}
-
 impl OtherRatio {
     /// The ratio that the rows turn by, if they contradict `ratio`.
-    pub(crate) fn of(files: &[Recording], ratio: f64) -> Option<OtherRatio> {
+    fn of(log: &Recording, ratio: f64) -> Option<OtherRatio> {
         let (mut xx, mut xe, mut ee, mut rows) = (0.0, 0.0, 0.0, 0.0);
-        for session in files.iter().flat_map(|file| &file.sessions) {
+        for session in &log.sessions {
             let count = session.len().max(1) as f64;
             rows += count;
             let output = || session.generator_rad.iter().map(|psi| psi / ratio);
@@ -451,21 +443,21 @@ impl OtherRatio {
             error_rad,
         })
     }
-
-    /// Whether it is a wrong number rather than a rounded one.
-    pub(crate) fn is_far(&self) -> bool {
-        (self.near - self.given).abs() >= 1.0
-    }
 }
 
-/// The same of one log: said and not refused where the output moves little and errs as one of a gear may.
-pub(crate) fn check_ratio_of(log: &Recording, ratio: f64) -> Result<Option<String>, OtherRatio> {
-    let Some(other) = OtherRatio::of(std::slice::from_ref(log), ratio) else { return Ok(None) };
+/// Refuses a ratio that the rows of a log contradict; says so alone where it may be rounded, or the output moves little
+/// and errs as one of a gear may.
+pub(crate) fn check_ratio_of(log: &Recording, ratio: f64) -> Result<Option<String>, CalibrationError> {
+    let Some(other) = OtherRatio::of(log, ratio) else { return Ok(None) };
     let (from, to) = least_and_most(log.sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
     let moves_little = (to - from) / ratio.abs() < PERIOD_OF_THE_OUTPUT * std::f64::consts::TAU;
     // A load that grows over a few rows looks the same.
     let may_be_load = moves_little && other.error_rad < MOST_ERROR_RAD;
-    if other.is_far() && !may_be_load { Err(other) } else { Ok(Some(other.to_string())) }
+    let is_far = (other.near - other.given).abs() >= 1.0;
+    if is_far && !may_be_load {
+        return Err(CalibrationError::Ratio { file: log.file.clone(), other });
+    }
+    Ok(Some(other.to_string()))
 }
 
 /// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
@@ -511,7 +503,8 @@ fn from_logs<T>(
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
     prior.core_drive()?;
-    let said: Vec<String> = check_ratio(files, prior.nominal.ratio)?.into_iter().collect();
+    let said = files.iter().map(|file| check_ratio_of(file, prior.nominal.ratio)).collect::<Result<Vec<_>, _>>()?;
+    let said: Vec<String> = said.into_iter().flatten().collect();
     let parted: Vec<Recording>;
     let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
         parted = files.iter().flat_map(by_zeros).collect();

@@ -334,9 +334,7 @@ pub fn parse_rows(
     let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
     // Teeth that skip look like another ratio.
     if recording.tooth_steps.is_empty() {
-        let said = check_ratio_of(&recording, subject.nominal.ratio);
-        let refused = |other| CalibrationError::Ratio { file: recording.file.clone(), other };
-        let said = said.map_err(refused)?;
+        let said = check_ratio_of(&recording, subject.nominal.ratio)?;
         recording.notes.extend(said);
     }
     subject.take_away_known(&mut recording)?;
