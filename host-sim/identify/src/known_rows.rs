@@ -14,6 +14,7 @@ use crate::measurement::{
 };
 use crate::nominal::Nominal;
 use flexspline_base::robust::mean;
+use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Fewest rows that a table is played over. *Source*: one has no mean to be about.
 pub(crate) const FEW: usize = 2;
@@ -61,13 +62,10 @@ pub fn parse_known(
     Ok(read)
 }
 
-/// Waves of the output that are no waves of the generator in degrees: as a table has them.
-const OUTPUT_ORDERS: usize = 6;
 /// Generator turns in degrees that tell waves from drift. *Guess*.
 const MANY_TURNS: f64 = 10.0;
-/// Share of the squares that the waves of the generator take in the reading that is meant, at least, and in the other,
-/// at most. *Guesses*.
-const REPEATS: [f64; 2] = [0.5, 0.1];
+/// The reading that is meant leaves less than this share of the squares that the other leaves. *Guess*.
+const LEAVES: f64 = 0.5;
 /// Rows that are looked at, about.
 const LOOKED_AT: usize = 20_000;
 
@@ -75,56 +73,45 @@ const LOOKED_AT: usize = 20_000;
 /// the generator in degrees and not in radians. A unit that the mapping says is believed.
 fn check_waves(read: &Recording, columns: &ColumnMap, ratio: f64) -> Result<(), MeasuredError> {
     let (generator, said) = columns.column(Quantity::Generator);
-    let of_degrees = 1f64.to_radians();
-    let angles = || read.sessions.iter().flat_map(|session| session.generator_rad.iter().copied());
-    let (from, to) = least_and_most(angles());
-    if said || (to - from) * of_degrees < MANY_TURNS * TAU {
+    let degree = 1f64.to_radians();
+    let (from, to) = least_and_most(read.sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
+    if said || (to - from) * degree < MANY_TURNS * TAU {
         return Ok(());
     }
-    let every = read.sessions.iter().map(Session::len).sum::<usize>().div_ceil(LOOKED_AT).max(1);
     let rows = read.sessions.iter().flat_map(|session| {
         let zero = mean(&session.error_rad);
         session.states(0.0).zip(&session.error_rad).map(move |([psi, torque, _], error)| [psi, torque, error - zero])
     });
-    let rows: Vec<[f64; 3]> = rows.step_by(every).collect();
-    let waves = |psi: f64, orders: usize, row: &mut [f64]| {
-        let values = (1..=orders).flat_map(|order| <[f64; 2]>::from((order as f64 * psi).sin_cos()));
-        row.iter_mut().zip(values).for_each(|(place, value)| *place = value);
-    };
-    // Of the generator in radians (1), in degrees, or none.
-    let left = |unit: Option<f64>| {
-        let width = 2 + 2 * OUTPUT_ORDERS + 4 + if unit.is_some() { 4 } else { 0 };
-        let fit = Normal::of(width, rows.len(), |k, row| {
+    let count: usize = read.sessions.iter().map(Session::len).sum();
+    let rows: Vec<[f64; 3]> = rows.step_by(count.div_ceil(LOOKED_AT).max(1)).collect();
+    // Load, and waves of the output in either unit, as many as a table has, and of the generator in one.
+    let left = |unit: f64| {
+        let fit = Normal::of(22, rows.len(), |k, row| {
             let [psi, torque, error] = rows[k];
+            let waves = [(psi / ratio, 6), (degree * psi / ratio, 2), (unit * psi, 2)].into_iter();
+            let orders = waves.flat_map(|(angle, most)| (1..=most).map(move |order| f64::from(order) * angle));
             row[1] = torque;
-            waves(psi / ratio, OUTPUT_ORDERS, &mut row[2..]);
-            waves(of_degrees * psi / ratio, 2, &mut row[2 + 2 * OUTPUT_ORDERS..]);
-            if let Some(unit) = unit {
-                waves(unit * psi, 2, &mut row[6 + 2 * OUTPUT_ORDERS..]);
-            }
+            let pairs = row[2..].chunks_exact_mut(2);
+            pairs.zip(orders).for_each(|(pair, angle)| (pair[0], pair[1]) = angle.sin_cos());
             (error, 1.0)
-        })?;
-        Some(fit.sound(rows.len())?.misfit())
+        });
+        fit.map(|fit| fit.misfit())
     };
-    let (Some(none), Some(radians), Some(degrees)) = (left(None), left(Some(1.0)), left(Some(of_degrees))) else {
+    let Some((radians, degrees)) = left(1.0).zip(left(degree)).filter(|(rad, deg)| *deg < LEAVES * rad) else {
         return Ok(());
     };
-    let [in_radians, in_degrees] = [radians, degrees].map(|left| 1.0 - left / none.max(f64::MIN_POSITIVE));
-    if in_degrees < REPEATS[0] || in_radians > REPEATS[1] {
-        return Ok(());
-    }
     let output = columns.column(Quantity::Output).0;
+    let rms = |squares: f64| (squares / rows.len() as f64).sqrt() * ARCSEC_PER_RAD;
     let seen = format!(
-        "{generator}: waves of one and two to 2 pi of it take {:.0} % of the error that loads and the output leave, to \
-         360 of it {:.0} %",
-        100.0 * in_radians,
-        100.0 * in_degrees
+        "beside load and waves of the output, waves of {generator} to 2 pi leave {:.0} arcsec rms, to 360 {:.0}",
+        rms(radians),
+        rms(degrees)
     );
+    let why = "angles in degrees read as radians";
     let readings = vec![
         format!("--columns generator={generator}:deg,output={output}:deg"),
-        format!("generator={generator}:rad if they are not"),
+        format!("--columns generator={generator}:rad,output={output}:rad if they are not"),
     ];
-    let why = "angles in degrees read as radians";
     Err(MeasuredError::of_file(&read.file, &Refusal::OtherReading { seen, why, readings }))
 }
 
@@ -132,7 +119,6 @@ fn check_waves(read: &Recording, columns: &ColumnMap, ratio: f64) -> Result<(), 
 mod tests {
     use super::*;
     use crate::synthesize::catalogue_drive;
-    use flexspline_base::units::ARCSEC_PER_RAD;
 
     /// A model shows that angles are in degrees, which is refused, and that a torque counts the other way, which is put
     /// right; without one neither shows.
@@ -172,6 +158,32 @@ mod tests {
         assert!(read.faults.len() == 1 && read.faults[0].what.contains("turned round"), "{:?}", read.faults);
         let (a, b) = (&read.sessions[0], &right.sessions[0]);
         assert!(a.error_rad == b.error_rad && a.torque_n_m == b.torque_n_m);
+    }
+
+    /// With the ratio alone the waves of the generator show degrees; a unit that is given is believed, and radians are
+    /// read.
+    #[test]
+    fn degrees_are_refused_by_the_waves_of_the_generator() {
+        let log = |unit: f64| {
+            let mut text = "generator_rad,output_rad,torque_n_m\n".to_owned();
+            for k in 0..9000 {
+                let psi = 0.08 * f64::from(k);
+                let load = 20.0 * (0.004 * f64::from(k)).sin();
+                let error = 15.0 * (2.0 * psi).sin() + 60.0 * (psi / 100.0).cos() + 2.0 * load;
+                text += &format!("{},{},{load}\n", unit * psi, unit * (psi / 100.0 + error / ARCSEC_PER_RAD));
+            }
+            text
+        };
+        let nominal = crate::calibrate::Prior::of_ratio(100.0, flexspline_mechanics::drive::GeneratorKind::Cam).nominal;
+        let read = |map: &str, unit: f64| {
+            let map = if map.is_empty() { ColumnMap::default() } else { ColumnMap::parse(map).unwrap() };
+            parse_known("m.csv", log(unit).as_bytes(), &map, &nominal, None).map_err(|error| error.to_string())
+        };
+        assert!(read("", 1.0).is_ok());
+        let refused = read("", 1f64.to_degrees()).unwrap_err();
+        assert!(refused.contains("degrees") && refused.contains("generator=generator_rad:deg"), "{refused}");
+        let given = "generator=generator_rad:deg,output=output_rad:deg,torque=torque_n_m:N.m";
+        assert!(read(given, 1f64.to_degrees()).is_ok());
     }
 
     /// Of thirty rows six have a time of their own in their order.

@@ -286,23 +286,13 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
             "error of the parts over all that the table is to hold, arcsec rms: {before:.2} after these logs"
         );
     }
-    let noise = if planned.noise.white_arcsec > 0.0 {
-        format!(
-            "{:.2} arcsec from row to row and {:.2} besides",
-            planned.noise.white_arcsec,
-            planned.noise.lasting_arcsec()
-        )
-    } else {
-        format!(
-            "{:.2} arcsec (rows are too far apart to tell what of it changes from row to row)",
-            planned.noise.rms_arcsec
-        )
-    };
     let _ = writeln!(
         text,
-        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {noise}; what no part has, and an eccentric \
-         encoder at the output, come on top",
-        planned.expected_rms_arcsec
+        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2}, {:.2} of it drift; what no part has, and \
+         an eccentric encoder at the output, come on top",
+        planned.expected_rms_arcsec,
+        planned.noise.rms_arcsec,
+        planned.noise.lasting_arcsec()
     );
     text + &format!("wrote to {}/: plan.csv, plan.json", out.display())
 }

@@ -513,12 +513,11 @@ fn from_logs<T>(
         files
     };
     let mut recorded = Recorded::of(files, prior);
-    let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
-    let mut rows = settled(files, prior, &recorded, play_rad);
+    let mut rows = settled(files, prior, &recorded);
     let delays = Delays::of(rows.clone(), prior, &recorded);
     let at_one_instant = delays.as_ref().map(|delays| delays.taken_out(files, prior.nominal.ratio));
     if let Some(files) = &at_one_instant {
-        rows = settled(files, prior, &recorded, play_rad);
+        rows = settled(files, prior, &recorded);
     }
     let logs = Logs { measured: files, at_one_instant: at_one_instant.as_deref().unwrap_or(files), delays };
     if let Some(table) = prior.table {

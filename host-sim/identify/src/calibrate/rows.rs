@@ -237,8 +237,9 @@ pub fn one_in(total: usize) -> f64 {
     if every > 1.0 { every + super::GOLDEN } else { 1.0 }
 }
 
-/// The rows on which a steady model can be judged; `play_rad` is the whole play at the output.
-pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Rows {
+/// The rows on which a steady model can be judged: outside of the play of the prior.
+pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded) -> Rows {
+    let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let total: usize = files.iter().flat_map(|file| &file.sessions).map(Session::len).sum();
     let every = one_in(total);
     let sessions: usize = files.iter().map(|file| file.sessions.len()).sum();
