@@ -55,11 +55,6 @@ const FEWEST_ROWS: usize = 64;
 /// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load
 /// of interest.
 const LEAST_FRICTION: f64 = 0.02;
-/// Rows between two dead zones tell them apart if their load is clear of both by this multiple of the torque's noise…
-const CLEAR_OF_NOISE: f64 = 6.0;
-/// …and if the other leaves less than this share of their squares: where it is right, half of them lie on the wrong
-/// flank.
-const OTHER_DEAD_ZONE: f64 = 0.8;
 /// Torques within this share of the largest are one.
 const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
@@ -520,9 +515,9 @@ fn from_logs<T>(
         rows = settled(files, prior, &recorded);
     }
     let logs = Logs { measured: files, at_one_instant: at_one_instant.as_deref().unwrap_or(files), delays };
-    if let Some(table) = prior.table {
-        (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
-    }
+    // A load in the dead zone of a table decides no flank.
+    let own_n_m = prior.table.map_or(0.0, dead_zone_n_m);
+    recorded.scales.friction_n_m = recorded.scales.friction_n_m.max(own_n_m);
     let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
     let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
     made(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files, &notes))
@@ -719,28 +714,6 @@ fn with_faults(error: CalibrationError, files: &[Recording], said: &[String]) ->
         CalibrationError::NothingGained(error) => CalibrationError::NothingGained(after(error, said)),
         other => other,
     }
-}
-
-/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, unless rows with loads
-/// between it and that of a drive with the usual friction say otherwise; with the rows less what the table says so.
-fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> (Rows, f64) {
-    let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
-    let less = |rows: Rows, least_friction_n_m: f64| rows.less(&Prior { least_friction_n_m, ..prior.clone() });
-    if own <= 0.0 || own >= usual {
-        let larger = own.max(usual);
-        return (less(rows, larger), larger);
-    }
-    let noise = CLEAR_OF_NOISE * recorded.torque_noise_n_m;
-    let between = own + noise..usual - noise;
-    let left = |friction_n_m: f64| -> Vec<f64> {
-        let rows = less(rows.clone(), friction_n_m).rows.into_iter();
-        rows.filter(|row| between.contains(&row.at.torque_n_m.abs())).map(|row| row.left_arcsec.powi(2)).collect()
-    };
-    let (by_own, by_usual) = (left(own), left(usual));
-    let other =
-        by_own.len() >= FEWEST_ROWS && by_usual.iter().sum::<f64>() < OTHER_DEAD_ZONE * by_own.iter().sum::<f64>();
-    let chosen = if other { usual } else { own };
-    (less(rows, chosen), chosen)
 }
 
 /// The zero of the output in each file.

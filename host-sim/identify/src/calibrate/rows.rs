@@ -6,7 +6,7 @@ use super::folds::{Folds, Row};
 use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State};
 use super::prior::Prior;
 use crate::least_squares::Normal;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -63,8 +63,6 @@ pub(super) struct Recorded {
     pub generator_turns: f64,
     /// Of the way of the generator, there and back.
     pub backward_share: f64,
-    /// Noise of the torque from row to row, N·m.
-    pub torque_noise_n_m: f64,
     /// Usual step of the generator, rad.
     pub step_rad: f64,
     /// Generator turns in steps that are short beside a tooth pitch.
@@ -130,9 +128,7 @@ impl Recorded {
         };
         let unrecorded = without_rows(angles(1.0 / prior.nominal.ratio), PARTS_OF_A_TURN);
         let output_share = share_with_rows(unrecorded, PARTS_OF_A_TURN);
-        let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
-            torque_noise_n_m,
             scales: Scales {
                 torque_n_m: if has_torque { [torque.0, torque.1] } else { [0.0; 2] },
                 friction_n_m: prior.friction_n_m().max(if has_torque { super::LEAST_FRICTION * most } else { 0.0 }),
