@@ -13,7 +13,7 @@ use crate::measurement::{
     parse_at_least,
 };
 use crate::nominal::Nominal;
-use flexspline_base::robust::mean;
+use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Fewest rows that a table is played over. *Source*: one has no mean to be about.

@@ -101,8 +101,7 @@ impl<'a> Misfit<'a> {
         // A turn of the output later the table is the same.
         let half = (0.5 * self.table.drive().exact_ratio().abs()).ceil() as i64;
         let all: Vec<(i64, f64)> = (-half..=half).map(|turns| (turns, left(turns))).collect();
-        let (best, least) =
-            all.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.abs().cmp(&b.0.abs())))?;
+        let (best, least) = all.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.abs().cmp(&b.0.abs())))?;
         self.clear(least).filter(|_| best != 0)?;
         let likely = |turns: &i64| all.iter().any(|(other, left)| other == turns && *left <= AS_LIKELY * least);
         let run = |by: i64| (1..).map(|k| best + by * k).take_while(likely).last().unwrap_or(best);

@@ -13,8 +13,8 @@ use thiserror::Error;
 use crate::calibrate::{CalibrationError, check_ratio_of};
 use crate::known_rows::parse_known;
 use crate::measurement::{ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment};
-use crate::nominal::Nominal;
 use crate::misfit::{Misfit, TurnsOff, about_mean};
+use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::generator_of;
 
@@ -186,7 +186,9 @@ impl ReplaySummary {
             format!("the table leaves {left:.1} arcsec rms of {measured:.1}")
         };
         match why.as_slice() {
-            [] if nothing => vec![format!("{begin}; neither whole turns of the motor nor the torque explain that; {is_of_unit}")],
+            [] if nothing => {
+                vec![format!("{begin}; neither whole turns of the motor nor the torque explain that; {is_of_unit}")]
+            }
             [] => Vec::new(),
             [one] => vec![format!("{begin}; {one}")],
             several => vec![format!("{begin}; these rows allow several reasons: {}", several.join("; or "))],

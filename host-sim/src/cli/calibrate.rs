@@ -8,16 +8,15 @@ use flexspline::Table;
 
 use super::context::{Context, quoted, table_image, table_of};
 use super::logs::LogOptions;
-use super::{Failure, bad_file, bad_input, report, say};
+use super::{Failure, bad_input, report, say};
 use flexspline_base::output::Outputs;
-use flexspline_design::tables::{MadeTable, c_header, rust_source};
+use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
     Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, one_in, plan,
 };
 use flexspline_identify::diagnosis::Subject;
 use flexspline_identify::extension::Model;
 use flexspline_identify::known_rows::read_known;
-use flexspline_identify::measurement::Recording;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::calibration_report;
 

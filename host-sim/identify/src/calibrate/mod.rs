@@ -31,7 +31,6 @@ use serde::Serialize;
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
-use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
 use interval::OF_95;
@@ -477,23 +476,6 @@ fn given_twice(files: &[Recording]) -> Option<[&str; 2]> {
 /// # Errors
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
-    from_logs(files, prior, |logs, prior, rows, said| FittedTable::of(logs, prior, rows)?.calibrated(logs, said))
-}
-
-/// The table alone.
-///
-/// # Errors
-/// As [`calibrate`].
-pub(crate) fn table_of(files: &[Recording], prior: &Prior<'_>) -> Result<MadeTable, CalibrationError> {
-    from_logs(files, prior, |logs, prior, rows, _| Ok(FittedTable::of(logs, prior, rows)?.table))
-}
-
-/// What is `made` of the logs, their rows in steady motion, and what is noted of the ratio.
-fn from_logs<T>(
-    files: &[Recording],
-    prior: &Prior<'_>,
-    made: impl FnOnce(&Logs<'_>, &Prior<'_>, (Rows, Recorded), Vec<String>) -> Result<T, CalibrationError>,
-) -> Result<T, CalibrationError> {
     if let Some([one, other]) = given_twice(files) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
@@ -520,7 +502,8 @@ fn from_logs<T>(
     recorded.scales.friction_n_m = recorded.scales.friction_n_m.max(own_n_m);
     let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
     let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
-    made(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files, &notes))
+    let fitted = FittedTable::of(&logs, prior, (rows, recorded));
+    fitted.and_then(|fitted| fitted.calibrated(&logs, said)).map_err(|error| with_faults(error, files, &notes))
 }
 
 /// Logs with delays between the readings, and without.
@@ -903,49 +886,47 @@ fn remarks(
     model: &Model,
     play_of_a_millisecond_arcsec: Option<f64>,
 ) -> Vec<String> {
-    let mut remarks = Vec::new();
     let has = |part: PartName| model.chosen.iter().any(|chosen| chosen.part == part);
-    if prior.nominal.teeth.is_none() && prior.table.is_none() {
-        let teeth = prior.nominal.teeth_or_of_two_waves();
-        remarks.push(format!(
-            "the ratio alone was given: the table is marked with {} and {} teeth, two waves",
-            teeth.flexspline, teeth.circular_spline
-        ));
-    }
-    if model.chosen.is_empty() {
-        remarks.push(
+    let said = |there: bool, what: &str| there.then(|| what.to_owned());
+    let by_ratio = prior.nominal.teeth.is_none() && prior.table.is_none();
+    let teeth = prior.nominal.teeth_or_of_two_waves();
+    let remarks = [
+        by_ratio.then(|| {
+            format!(
+                "the ratio alone was given: the table is marked with {} and {} teeth, two waves",
+                teeth.flexspline, teeth.circular_spline
+            )
+        }),
+        said(
+            model.chosen.is_empty(),
             "no part gains in what was left out: the table is what was known before, its zeros aside; are the logs of \
-             this unit, and of one?"
-                .to_owned(),
-        );
-    }
-    if recorded.output_share < 1.0 && has(PartName::OutputAngle) {
-        remarks.push(format!(
-            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle {}, and is not \
-             measured",
-            100.0 * recorded.output_share,
-            if recorded.scales.unrecorded == 0 { "joins its ends" } else { "is held at zero" }
-        ));
-    }
-    if recorded.each_keeps_to_one_load {
-        remarks.push(
+             this unit, and of one?",
+        ),
+        (recorded.output_share < 1.0 && has(PartName::OutputAngle)).then(|| {
+            format!(
+                "{:.0} % of an output turn was recorded: in the rest the curve over the output angle {}, and is not \
+                 measured",
+                100.0 * recorded.output_share,
+                if recorded.scales.unrecorded == 0 { "joins its ends" } else { "is held at zero" }
+            )
+        }),
+        said(
+            recorded.each_keeps_to_one_load,
             "each log keeps to one load: its wind-up is in the zero of the output, and the table has none; record \
-             several loads in one log"
-                .to_owned(),
-        );
-    }
-    if recorded.lacks(PartName::Play, prior).is_some() {
-        remarks.push("one direction was recorded: after a reversal the table says nothing new of the play".to_owned());
-    }
-    remarks.extend(play_of_a_millisecond_arcsec.map(note_of_one_pace));
-    if !recorded.has_torque {
-        remarks.push(
+             several loads in one log",
+        ),
+        said(
+            recorded.lacks(PartName::Play, prior).is_some(),
+            "one direction was recorded: after a reversal the table says nothing new of the play",
+        ),
+        play_of_a_millisecond_arcsec.map(note_of_one_pace),
+        said(
+            !recorded.has_torque,
             "no torque was recorded: the table holds for no load alone, and at any other the core says that it is \
-             outside of the table"
-                .to_owned(),
-        );
-    }
-    remarks
+             outside of the table",
+        ),
+    ];
+    remarks.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

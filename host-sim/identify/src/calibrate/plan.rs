@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::interval::{Node, OF_95, RowNoise, planned_covariance, row, row_of_group, spread, width_of, widths};
+use super::interval::{Node, OF_95, RowNoise, planned_covariance, row_of_group, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, Recorded, late_s};
 use super::{
@@ -94,28 +94,31 @@ impl Bench {
     /// Its fault, if any.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
-        let within = |name: &str, value: f64, low: f64, high: f64| {
-            let good = value.is_finite() && (low..=high).contains(&value);
-            (!good).then(|| format!("{name}: found {value}, allowed: {low} to {high}"))
-        };
-        let rising = |name: &str, [low, high]: [f64; 2]| {
-            let good = low.is_finite() && high.is_finite() && low <= high;
-            (!good).then(|| format!("{name}: found {low} and {high}, allowed: the lower first"))
-        };
-        let both = |name: &str, ends: [f64; 2], [low, high]: [f64; 2]| {
-            ends.into_iter().find_map(|end| within(name, end, low, high))
-        };
-        within("--minutes", self.minutes, 1.0, 1e5)
-            .or_else(|| within("--rate", self.rate_hz, 0.1, 1e6))
-            .or_else(|| within("--speed-rpm", self.speed_rpm, 1e-3, FASTEST_RPM))
-            .or_else(|| within("--noise-arcsec", self.noise_arcsec, 1e-3, 1e4))
-            .or_else(|| within("--wander-arcsec", self.wander_arcsec, 0.0, 1e4))
-            .or_else(|| rising("--load-n-m", self.torque_n_m))
-            .or_else(|| rising("--temperatures-c", self.temperature_c))
-            .or_else(|| both("--load-n-m", self.torque_n_m, LOADS_N_M))
-            .or_else(|| both("--temperatures-c", self.temperature_c, TEMPERATURES_C))
-            .or_else(|| rising("--travel-deg", self.output_deg))
-            .or_else(|| within("--travel-deg (its length)", self.output_deg[1] - self.output_deg[0], 1.0, 3.6e4))
+        let length = [self.output_deg[1] - self.output_deg[0]];
+        let within: [(&str, &[f64], [f64; 2]); 8] = [
+            ("--minutes", &[self.minutes], [1.0, 1e5]),
+            ("--rate", &[self.rate_hz], [0.1, 1e6]),
+            ("--speed-rpm", &[self.speed_rpm], [1e-3, FASTEST_RPM]),
+            ("--noise-arcsec", &[self.noise_arcsec], [1e-3, 1e4]),
+            ("--wander-arcsec", &[self.wander_arcsec], [0.0, 1e4]),
+            ("--load-n-m", &self.torque_n_m, LOADS_N_M),
+            ("--temperatures-c", &self.temperature_c, TEMPERATURES_C),
+            ("--travel-deg (its length)", &length, [1.0, 3.6e4]),
+        ];
+        let rising = [
+            ("--load-n-m", self.torque_n_m),
+            ("--temperatures-c", self.temperature_c),
+            ("--travel-deg", self.output_deg),
+        ];
+        let falls = rising.into_iter().find(|(_, [low, high])| !(low.is_finite() && high.is_finite() && low <= high));
+        let falls =
+            falls.map(|(name, [low, high])| format!("{name}: found {low} and {high}, allowed: the lower first"));
+        falls.or_else(|| {
+            within.into_iter().find_map(|(name, values, [low, high])| {
+                let bad = values.iter().find(|value| !(low..=high).contains(*value))?;
+                Some(format!("{name}: found {bad}, allowed: {low} to {high}"))
+            })
+        })
     }
 
     /// The noise that it is expected to have, of rows as many as are fitted.
@@ -372,44 +375,33 @@ fn in_order(mut passes: Vec<Pass>) -> Vec<Pass> {
     passes
 }
 
-/// Target of the plan: the mean of `x xᵀ` over all that it is to hold.
-struct Asked {
-    width: usize,
-    moment: Vec<f64>,
-}
+/// Target of the plan: the mean of `x xᵀ` over all that it is to hold, about the mean of `x`, as what is the same
+/// everywhere is the zero of the encoder.
+struct Asked(Gram);
 
 impl Asked {
     fn of(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[PartName]) -> Asked {
-        let mut rows: Vec<Vec<f64>> =
-            spread(scales, ratio, travel, ASKED).iter().map(|at| row(chosen, at, scales)).collect();
+        let mut moment = Gram::none(width_of(chosen) + 2);
         // The zero by temperature: logs of one temperature each cannot tell it from the encoder's.
-        if let Some(at) = chosen.iter().position(|part| *part == PartName::Temperature) {
-            let zero = width_of(&chosen[..at]);
-            rows.iter_mut().for_each(|row| row[zero] = 0.0);
+        let warmth = chosen.iter().position(|part| *part == PartName::Temperature);
+        let zero = warmth.map(|at| 1 + width_of(&chosen[..at]));
+        for at in spread(scales, ratio, travel, ASKED) {
+            let mut row = row_of_group(chosen, &at, scales, 0.0);
+            zero.into_iter().for_each(|zero| row[zero] = 0.0);
+            moment.add_row(&row, 1.0 / ASKED as f64);
         }
-        // What is the same everywhere is the encoder's zero, and nobody's error.
-        let count = rows.len() as f64;
-        let width = rows.first().map_or(0, Vec::len);
-        let means: Vec<f64> = (0..width).map(|i| rows.iter().map(|row| row[i]).sum::<f64>() / count).collect();
-        let mut moment = vec![0.0; width * width];
-        for row in &rows {
-            for i in 0..width {
-                for j in 0..width {
-                    moment[i * width + j] += (row[i] - means[i]) * (row[j] - means[j]) / count;
-                }
-            }
-        }
-        Asked { width, moment }
+        Asked(moment.first_free())
     }
 
     /// Mean variance of some of the columns.
     fn variance_of(&self, covariance: &[f64], columns: std::ops::Range<usize>) -> f64 {
+        let width = self.0.size - 1;
         let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
-        pairs.map(|(i, j)| self.moment[i * self.width + j] * covariance[i * self.width + j]).sum::<f64>().max(0.0)
+        pairs.map(|(i, j)| self.0.at(i, j) * covariance[i * width + j]).sum::<f64>().max(0.0)
     }
 
     fn mean_variance(&self, covariance: &[f64]) -> f64 {
-        self.variance_of(covariance, 0..self.width)
+        self.variance_of(covariance, 0..self.0.size - 1)
     }
 
     /// The part whose variance falls most.

@@ -109,6 +109,9 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
 /// of another unit. Guesses.
 const TURNED_BACK: f64 = 0.8;
 const AS_ALONE: [f64; 2] = [1.1, 1.3];
+/// Logs that are turned, at most: pieces of one log with zeros of their own are many, and their generator is one.
+/// *Guess*.
+const MOST_LOGS: usize = 8;
 /// Rows that an angle is looked for with, and steps over a generator turn, coarse ones and the fine ones in each: an
 /// eighth of the wave of the highest order, and less.
 const ROWS_OF_A_SEARCH: usize = 300;
@@ -125,7 +128,7 @@ pub(super) fn generators_turned(
 ) -> Option<String> {
     let before = agreement.together_arcsec;
     // All together never leave less than each alone, whichever way they are turned.
-    if agreement.alone_arcsec.powi(2) >= TURNED_BACK * before * before {
+    if files.len() > MOST_LOGS || agreement.alone_arcsec.powi(2) >= TURNED_BACK * before * before {
         return None;
     }
     let (folds, chosen) = by_log(rows, parts, &model.scales);
@@ -137,8 +140,7 @@ pub(super) fn generators_turned(
     let turned_by = |log: usize| {
         let of_log = rows.rows.iter().filter(move |row| row.at.log == log);
         let friction = model.scales.friction_n_m;
-        let search =
-            PhaseSearch::new(&says, ratio, (of_log, |row| row.measured_arcsec), friction, ROWS_OF_A_SEARCH);
+        let search = PhaseSearch::new(&says, ratio, (of_log, |row| row.measured_arcsec), friction, ROWS_OF_A_SEARCH);
         let coarse = search.found(repeats, step, step / FINE_STEPS);
         within(search.close_to(coarse.zero_rad, step / FINE_STEPS)[0], repeats)
     };

@@ -238,8 +238,7 @@ impl<'a> PhaseSearch<'a> {
             vertex(three.each_ref().map(|left| dot(left, left) - dot(&left[begin..end], &left[begin..end])))
         };
         let (rows, size) = (self.at.len(), self.at.len().div_ceil(BLOCKS).max(1));
-        let blocks: Vec<f64> =
-            (0..rows).step_by(size).map(|begin| without(begin, (begin + size).min(rows))).collect();
+        let blocks: Vec<f64> = (0..rows).step_by(size).map(|begin| without(begin, (begin + size).min(rows))).collect();
         [zero_rad + without(0, 0) * step, jackknife(&blocks) * step]
     }
 }
@@ -259,9 +258,8 @@ fn vertex([before, at, after]: [f64; 3]) -> f64 {
 pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignment {
     let says = |at: &State| steady(table, at, 0.0);
     let ratio = table.drive().exact_ratio();
-    let of = |most: usize| {
-        PhaseSearch::new(&says, ratio, (rows.rows.iter(), |row| row.measured_arcsec), friction_n_m, most)
-    };
+    let of =
+        |most: usize| PhaseSearch::new(&says, ratio, (rows.rows.iter(), |row| row.measured_arcsec), friction_n_m, most);
     let repeats = repeats(table);
     let pitch = TAU / f64::from(table.drive().ripple_order());
     let fine_step = pitch / STEPS_OF_A_PITCH as f64;

@@ -21,7 +21,7 @@ use thiserror::Error;
 use super::report::{Cause, Diagnosis};
 use super::{DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
 use super::{channels, quieted, torque_zero, zeros};
-use crate::calibrate::{CalibrationError, Prior, check_ratio_of, table_of};
+use crate::calibrate::{CalibrationError, Prior, calibrate, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
     CauseEntry, Evaluation, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError, TableKind,
@@ -603,7 +603,7 @@ impl Diagnosed {
         }
         let known = self.known_table.as_ref().map(|made| Table::check(&made.image)).transpose();
         let known = known.map_err(PipelineError::Image)?;
-        Ok(table_of(&[recording], &subject.prior(known.as_ref()))?)
+        Ok(calibrate(&[recording], &subject.prior(known.as_ref()))?.table)
     }
 
     /// The drive with the causes that are geometry, as far as the FEM bears them out.

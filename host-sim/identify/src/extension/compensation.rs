@@ -10,7 +10,7 @@ use flexspline::{Prediction, Table};
 use serde::Serialize;
 
 use super::sampled::ExtendedTables;
-use crate::calibrate::{LEAST_GAIN, Prior, table_of};
+use crate::calibrate::{LEAST_GAIN, Prior, calibrate};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::diagnosis::{Compensation, Extended, PipelineError, Series, Settings};
 use crate::measurement::{Recording, Session, rms};
@@ -227,8 +227,8 @@ pub fn evaluate(
     }
     let learnt = sessions.iter().zip(&used).filter(|(_, used)| **used).map(|(session, _)| session.clone());
     let learnt = measured.with_sessions(learnt.collect());
-    let by_calibrated = match table_of(&[learnt], prior) {
-        Ok(made) => by_image(made.image),
+    let by_calibrated = match calibrate(&[learnt], prior) {
+        Ok(made) => by_image(made.table.image),
         Err(why) => {
             evaluation.not_made.extend(why.to_string().lines().next().map(str::to_owned));
             None

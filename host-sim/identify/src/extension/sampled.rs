@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use flexspline::{Direction, Table};
 use flexspline_make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 
-use super::model::{CauseEntry, Model};
-use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER, ParameterName};
+use super::model::Model;
+use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER};
 use crate::diagnosis::{Extended, PipelineError, Series, nominal_arcsec};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
