@@ -502,8 +502,14 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     recorded.scales.friction_n_m = recorded.scales.friction_n_m.max(own_n_m);
     let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
     let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
-    let fitted = FittedTable::of(&logs, prior, (rows, recorded));
-    fitted.and_then(|fitted| fitted.calibrated(&logs, said)).map_err(|error| with_faults(error, files, &notes))
+    let friction_n_m = recorded.scales.friction_n_m;
+    let alignment = prior.table.map(|table| zero::align(table, &rows, friction_n_m));
+    let told = alignment.as_ref().filter(|found| found.told);
+    let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
+    let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
+    let made = fit_with_table(logs.at_one_instant, prior, (&rows, &recorded))
+        .and_then(|made| report(&logs, (prior, alignment), &recorded, made, said));
+    made.map_err(|error| with_faults(error, files, &notes))
 }
 
 /// Logs with delays between the readings, and without.
@@ -530,153 +536,130 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     pieces
 }
 
-/// A table with the fit that it is of, beside a prior with the phase that the rows have.
-struct FittedTable<'a> {
-    prior: Prior<'a>,
-    recorded: Recorded,
-    alignment: Option<Alignment>,
-    fitted: Fitted,
-    table: MadeTable,
+/// The fit whose table can be made, and that table.
+fn fit_with_table(
+    files: &[Recording],
+    prior: &Prior<'_>,
+    (rows, recorded): (&Rows, &Recorded),
+) -> Result<(Fitted, MadeTable), CalibrationError> {
+    let fitted_without = |without: &[Without]| {
+        let fitted = fit(rows.clone().less(prior), prior, recorded, without)?;
+        fitted.is_worth_a_table(recorded, prior, files).map(|()| fitted)
+    };
+    let fitted = fitted_without(&[])?;
+    Ok(match table::make(prior, &fitted.model, recorded) {
+        // A table has no wind-up that falls with the load, and none that the lag outruns.
+        Err(error) if error.is_of_a_fall() => {
+            if fitted.model.of(PartName::WindUp).is_some() {
+                fitted.model.gives_way_with_the_load(prior)?;
+            }
+            const FALLS: &str = "it would fall with the load somewhere, which no spring does";
+            let (wind_up, play) = ((PartName::WindUp, FALLS), (PartName::Play, FALLS));
+            let tried = [vec![wind_up], vec![play], vec![wind_up, play]].into_iter().filter_map(|without| {
+                let fitted = fitted_without(&without).ok()?;
+                table::make(prior, &fitted.model, recorded).ok().map(|made| (fitted, made))
+            });
+            let left = |(fitted, _): &(Fitted, MadeTable)| fitted.held_out.rms_after_arcsec;
+            tried.min_by(|a, b| left(a).total_cmp(&left(b))).ok_or(error)?
+        }
+        made => (fitted, made?),
+    })
 }
 
-impl<'a> FittedTable<'a> {
-    /// Fits to `rows` with the load that decides the flank as it stands in `recorded`.
-    fn of(
-        logs: &Logs<'_>,
-        prior: &Prior<'a>,
-        (rows, recorded): (Rows, Recorded),
-    ) -> Result<FittedTable<'a>, CalibrationError> {
-        let prior = &Prior { least_friction_n_m: recorded.scales.friction_n_m, ..prior.clone() };
-        let alignment = prior.table.map(|table| zero::align(table, &rows, recorded.scales.friction_n_m));
-        let aligned = Prior {
-            zero_rad: alignment
-                .as_ref()
-                .filter(|found| found.told)
-                .map_or(0.0, |found| found.generator_zero_deg.to_radians()),
-            ..prior.clone()
-        };
-        let (prior, files) = (&aligned, logs.at_one_instant);
-        let fitted_without = |without: &[Without]| {
-            let fitted = fit(rows.clone().less(prior), prior, &recorded, without)?;
-            fitted.is_worth_a_table(&recorded, prior, files).map(|()| fitted)
-        };
-        let fitted = fitted_without(&[])?;
-        let (fitted, table) = match table::make(prior, &fitted.model, &recorded) {
-            // A table has no wind-up that falls with the load, none that the lag outruns, and no error beyond its
-            // limit, which a curve that has to come to zero may pass.
-            Err(error) if error.is_of_a_fall() || recorded.scales.unrecorded != 0 => {
-                const FALLS: &str = "it would fall with the load somewhere, which no spring does";
-                const LARGE: &str = "it is too large for a table with a part of the turn";
-                let (wind_up, play) = ((PartName::WindUp, FALLS), (PartName::Play, FALLS));
-                let mut tried = vec![vec![wind_up], vec![play], vec![wind_up, play]];
-                if !error.is_of_a_fall() {
-                    tried.push(Vec::new());
-                    tried.iter_mut().for_each(|without| without.push((PartName::OutputAngle, LARGE)));
-                } else if fitted.model.of(PartName::WindUp).is_some() {
-                    fitted.model.gives_way_with_the_load(prior)?;
-                }
-                let tried = tried.into_iter().filter_map(|without| {
-                    let fitted = fitted_without(&without).ok()?;
-                    table::make(prior, &fitted.model, &recorded).ok().map(|made| (fitted, made))
-                });
-                let left = |(fitted, _): &(Fitted, MadeTable)| fitted.held_out.rms_after_arcsec;
-                tried.min_by(|a, b| left(a).total_cmp(&left(b))).ok_or(error)?
-            }
-            made => (fitted, made?),
-        };
-        Ok(FittedTable { prior: aligned, recorded, alignment, fitted, table })
-    }
-
-    /// What is said of it; `said` is noted of the ratio.
-    fn calibrated(self, logs: &Logs<'_>, said: Vec<String>) -> Result<Calibrated, CalibrationError> {
-        let FittedTable { prior, recorded, alignment, fitted, table: made } = self;
-        let (prior, files) = (&prior, logs.at_one_instant);
-        let parts = fitted.judged(&recorded, prior);
-        let agreement = fitted.agreement();
-        let turned = agreement.as_ref().and_then(|agreement| {
-            together::generators_turned(agreement, &fitted.rows, (&fitted.open, &fitted.model), prior, files)
-        });
-        let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
-        let Fitted { rows, folds, model, held_out, .. } = fitted;
-        let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
-        let core = ByCore::of(files, &image, &recorded);
-        let reading_delay = logs.delays.as_ref().and_then(|delays| delays.shown(logs.measured, &image, &recorded));
-        let mut readings = logs.delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
-        let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, &recorded, prior);
-        let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
-        notes.extend(said);
-        notes.extend(reading_delay.as_ref().map(|delay| delay.note(&readings, files.len())));
-        // What is known by its angle needs no guess.
-        notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
-        notes.extend(remarks(prior, &recorded, &model, play_of_a_millisecond_arcsec));
-        let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
-        let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
-        let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
-        let none = || vec![0.0; files.len()];
-        let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
-        let left_out_arcsec = held_out.rms_after_arcsec;
-        let correlation = rows.load_with_output_angle();
-        let beside = collinear(&rows, &model, correlation);
-        let known = ModelUncertainty::of(&rows.rows, (&model, &beside), &delays, recorded.coarse_rad, left_out_arcsec)
-            .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
-        // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
-        // paces that were recorded.
-        let at_rest = |at: State| State { speed_rad_s: 0.0, ..at };
-        let as_fitted = |at: State| if logs.delays.is_some() { at_rest(at) } else { at };
-        let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
-        let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
-        let anywhere = anywhere(&rows, &recorded, prior);
-        let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
-        let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
-        let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
-        notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
-        let output_zeros = output_zeros(files, &rows, &model, known.noise);
-        let offset = |zero: &OutputZero| Reading {
-            name: "offset",
-            file: Some(zero.file.clone()),
-            value: zero.arcsec,
-            std: zero.half_width_arcsec / OF_95,
-        };
-        readings.extend(output_zeros.iter().map(offset));
-        let calibration = Calibration {
-            schema_version: 1,
-            files: files.iter().map(|file| file.file.clone()).collect(),
-            rows: rows.of,
-            rows_fitted: rows.rows.len(),
-            rows_unsettled: rows.unsettled,
-            left_out: match rows.folds {
-                FoldKind::Files => "files",
-                FoldKind::Sessions => "sessions",
-                FoldKind::Blocks => "blocks",
-            },
-            folds: folds.all().len(),
-            held_out,
-            core,
-            reading_delay,
-            play_of_a_millisecond_arcsec,
-            readings,
-            parts,
-            nodes: known.nodes(),
-            noise: known.noise,
-            half_width_arcsec,
-            half_width_as_recorded_arcsec,
-            half_width_at_another_pace_arcsec,
-            play_width_arcsec: play_width(&model, prior, &recorded),
-            alignment,
-            output_zeros,
-            zero_cost: cost(&image),
-            ratio: prior.nominal.ratio,
-            table_id: made.info.table_id.clone(),
-            image_bytes: made.image.len(),
-            projection_rms_arcsec: made.info.projection_rms_arcsec,
-            torque_n_m: image.torque_range_n_m(),
-            temperature_c: image.temperature_range_c(),
-            data_faults: files.iter().flat_map(|file| file.faults.iter().cloned()).collect(),
-            notes,
-            command: String::new(),
-        };
-        Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
-    }
+/// What is said of a table and of the fit that it is of; `said` is noted of the ratio.
+fn report(
+    logs: &Logs<'_>,
+    (prior, alignment): (&Prior<'_>, Option<Alignment>),
+    recorded: &Recorded,
+    (fitted, made): (Fitted, MadeTable),
+    said: Vec<String>,
+) -> Result<Calibrated, CalibrationError> {
+    let files = logs.at_one_instant;
+    let parts = fitted.judged(recorded, prior);
+    let agreement = fitted.agreement();
+    let turned = agreement.as_ref().and_then(|agreement| {
+        together::generators_turned(agreement, &fitted.rows, (&fitted.open, &fitted.model), prior, files)
+    });
+    let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
+    let Fitted { rows, folds, model, held_out, .. } = fitted;
+    let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
+    let core = ByCore::of(files, &image, recorded);
+    let reading_delay = logs.delays.as_ref().and_then(|delays| delays.shown(logs.measured, &image, recorded));
+    let mut readings = logs.delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
+    let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, recorded, prior);
+    let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
+    notes.extend(said);
+    notes.extend(reading_delay.as_ref().map(|delay| delay.note(&readings, files.len())));
+    // What is known by its angle needs no guess.
+    notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
+    notes.extend(remarks(prior, recorded, &model, play_of_a_millisecond_arcsec));
+    let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
+    let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
+    let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
+    let none = || vec![0.0; files.len()];
+    let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
+    let left_out_arcsec = held_out.rms_after_arcsec;
+    let correlation = rows.load_with_output_angle();
+    let beside = collinear(&rows, &model, correlation);
+    let known = ModelUncertainty::of(&rows.rows, (&model, &beside), &delays, recorded.coarse_rad, left_out_arcsec)
+        .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
+    // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
+    // paces that were recorded.
+    let at_rest = |at: State| State { speed_rad_s: 0.0, ..at };
+    let as_fitted = |at: State| if logs.delays.is_some() { at_rest(at) } else { at };
+    let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
+    let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
+    let anywhere = anywhere(&rows, recorded, prior);
+    let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
+    let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
+    let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
+    notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
+    let output_zeros = output_zeros(files, &rows, &model, known.noise);
+    let offset = |zero: &OutputZero| Reading {
+        name: "offset",
+        file: Some(zero.file.clone()),
+        value: zero.arcsec,
+        std: zero.half_width_arcsec / OF_95,
+    };
+    readings.extend(output_zeros.iter().map(offset));
+    let calibration = Calibration {
+        schema_version: 1,
+        files: files.iter().map(|file| file.file.clone()).collect(),
+        rows: rows.of,
+        rows_fitted: rows.rows.len(),
+        rows_unsettled: rows.unsettled,
+        left_out: match rows.folds {
+            FoldKind::Files => "files",
+            FoldKind::Sessions => "sessions",
+            FoldKind::Blocks => "blocks",
+        },
+        folds: folds.all().len(),
+        held_out,
+        core,
+        reading_delay,
+        play_of_a_millisecond_arcsec,
+        readings,
+        parts,
+        nodes: known.nodes(),
+        noise: known.noise,
+        half_width_arcsec,
+        half_width_as_recorded_arcsec,
+        half_width_at_another_pace_arcsec,
+        play_width_arcsec: play_width(&model, prior, recorded),
+        alignment,
+        output_zeros,
+        zero_cost: cost(&image),
+        ratio: prior.nominal.ratio,
+        table_id: made.info.table_id.clone(),
+        image_bytes: made.image.len(),
+        projection_rms_arcsec: made.info.projection_rms_arcsec,
+        torque_n_m: image.torque_range_n_m(),
+        temperature_c: image.temperature_range_c(),
+        data_faults: files.iter().flat_map(|file| file.faults.iter().cloned()).collect(),
+        notes,
+        command: String::new(),
+    };
+    Ok(Calibrated { calibration, table: made, known, rows, recorded: recorded.clone(), shown })
 }
 
 /// What keeps a table from being made, with what was noticed of the units and signs of the logs: before what it may be

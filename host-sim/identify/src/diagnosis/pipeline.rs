@@ -682,6 +682,7 @@ mod tests {
     use super::*;
     use crate::diagnosis::report::Finding;
     use crate::synthesize::catalogue_drive;
+    use flexspline_base::units::ARCSEC_PER_RAD;
 
     /// The finding, the notes and the diagnosis on terminal of a drive under 12 N·m, one way, with this error beside
     /// what its model says, arcsec.
@@ -717,5 +718,29 @@ mod tests {
         let (finding, notes, _) = found(|_| 0.0);
         assert_eq!(finding, Finding::NothingFound);
         assert!(!notes.iter().any(|note| note.contains("judge by")), "{notes:?}");
+    }
+
+    /// A model that holds a tilt of the output's encoder: a calibration has it neither in its rows nor in its table.
+    #[test]
+    fn the_output_encoders_error_is_taken_from_the_rows_of_a_calibration() {
+        let nominal = catalogue_drive();
+        let cause = "\n[[extension.cause]]\nname = \"output_encoder_tilt\"\n[extension.cause.parameters]\n\
+                     amplitude_arcsec = 40.0\nphase_rad = 0.3\n";
+        let text = Model { nominal: nominal.clone(), causes: Vec::new() }.to_toml() + cause;
+        let model = Model::from_toml("drive-extended.toml", &text).unwrap();
+        let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
+        let mut text = "time_s,generator_rad,error_arcsec\n".to_owned();
+        for k in 0..4000 {
+            let (psi, t) = (0.2 * f64::from(k), 0.01 * f64::from(k));
+            let tilt = 40.0 * (2.0 * psi / nominal.ratio + 0.3).sin();
+            text += &format!("{t:.2},{psi:.4},{:.6}\n", nominal.harmonics_arcsec(psi) + tilt);
+        }
+        let mut files = [parse("m.csv", text.as_bytes(), &ColumnMap::default(), &nominal.gear()).unwrap()];
+        assert!(subject.known_before(&mut files).unwrap().is_some());
+        let session = &files[0].sessions[0];
+        let left = session.generator_rad.iter().zip(&session.error_rad);
+        let off = left.map(|(psi, error)| (error * ARCSEC_PER_RAD - nominal.harmonics_arcsec(*psi)).abs());
+        assert!(off.fold(0.0, f64::max) < 0.5);
+        assert!(files[0].notes.iter().any(|note| note.contains("output_encoder_tilt")), "{:?}", files[0].notes);
     }
 }
