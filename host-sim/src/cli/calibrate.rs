@@ -141,8 +141,8 @@ impl Calibrate {
             .map(|file| read_known(file, &map, &prior.nominal, prior.table))
             .collect::<Result<Vec<_>, _>>();
         let mut files = files.map_err(bad_input)?;
-        let subject = |model| Ok(Subject::of_model(model, context.drive()?, self.generator));
-        let subject: Option<Subject<'_>> = model.map(subject).transpose()?;
+        let subject = |model| context.drive().map(|drive| Subject::of_model(model, drive, self.generator));
+        let subject = model.map(subject).transpose()?;
         let known = subject.map_or(Ok(None), |subject| subject.known_before(&mut files)).map_err(bad_input)?;
         let known = known.as_ref().map(|made| table_of(Path::new("drive-extended"), &made.image)).transpose()?;
         let prior = known.as_ref().map_or(prior, |known| Prior::of_table(known, self.generator));

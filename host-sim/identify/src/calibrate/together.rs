@@ -109,6 +109,8 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
 /// of another unit. Guesses.
 const TURNED_BACK: f64 = 0.8;
 const AS_ALONE: [f64; 2] = [1.1, 1.3];
+/// Whole turns are told if without them this multiple of the squares is left, at least. *Guess*.
+const OTHER_TURN: f64 = 1.2;
 /// Logs that are turned, at most: pieces of one log with zeros of their own are many, and their generator is one.
 /// *Guess*.
 const MOST_LOGS: usize = 8;
@@ -142,7 +144,11 @@ pub(super) fn generators_turned(
         let friction = model.scales.friction_n_m;
         let search = PhaseSearch::new(&says, ratio, (of_log, |row| row.measured_arcsec), friction, ROWS_OF_A_SEARCH);
         let coarse = search.found(repeats, step, step / FINE_STEPS);
-        within(search.close_to(coarse.zero_rad, step / FINE_STEPS)[0], repeats)
+        let [found, _] = search.close_to(coarse.zero_rad, step / FINE_STEPS);
+        // A curve that hardly goes beyond a turn tells no turns.
+        let in_a_turn = within(found, TAU);
+        let tells_turns = search.squares(in_a_turn) > OTHER_TURN * search.squares(found);
+        if tells_turns { within(found, repeats) } else { in_a_turn }
     };
     let turned: Vec<f64> = (0..files.len()).map(|log| if log == 0 { 0.0 } else { turned_by(log) }).collect();
     let mut rows = rows.clone();

@@ -205,7 +205,8 @@ impl<'a> PhaseSearch<'a> {
         self.basis.freed(self.at.iter().zip(&self.values).map(left).collect())
     }
 
-    fn squares(&self, zero_rad: f64) -> f64 {
+    /// Their sum of squares, arcsec².
+    pub(super) fn squares(&self, zero_rad: f64) -> f64 {
         let left = self.left(zero_rad);
         dot(&left, &left)
     }
