@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::{CalibrationError, check_ratio_of};
+use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, check_ratio_of};
 use crate::known_rows::parse_known;
 use crate::measurement::{ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment};
 use crate::misfit::{Misfit, TurnsOff, about_mean};
@@ -246,7 +246,7 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
     if let Some(fault) = recording.faults.iter().find(in_other_unit) {
         return Err(refuse(Some(fault.first_line), fault.what.clone()));
     }
-    let said = check_ratio_of(&recording, ratio).map_err(|error| match error {
+    let said = check_ratio_of(&recording, ratio, MOST_ERROR_RAD).map_err(|error| match error {
         CalibrationError::Ratio { other, .. } => refuse(None, other.to_string()),
         other => refuse(None, other.to_string()),
     })?;

@@ -287,8 +287,8 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
     }
     let _ = writeln!(
         text,
-        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2}, {:.2} of it drift; what no part has, and \
-         an eccentric encoder at the output, come on top",
+        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2}, {:.2} of it drift; what no part has, \
+         and an eccentric encoder at the output, come on top",
         planned.expected_rms_arcsec,
         planned.noise.rms_arcsec,
         planned.noise.lasting_arcsec()

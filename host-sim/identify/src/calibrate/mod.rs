@@ -73,8 +73,11 @@ const FINE_TURNS: f64 = 1.0;
 /// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number
 /// does, nothing is left.
 const OTHER_RATIO: f64 = 0.25;
+/// Error by a wrong ratio in one of several logs that move little, at least, rad rms. A guess: 15 arc-minutes, where
+/// wind-up and clearance are a few.
+const LEAST_OF_OTHER_RATIO_RAD: f64 = 0.0044;
 /// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
-const MOST_ERROR_RAD: f64 = 0.0175;
+pub(crate) const MOST_ERROR_RAD: f64 = 0.0175;
 /// Arcsec that are taken for rounding.
 const ROUNDING_ARCSEC: f64 = 1e-6;
 /// Coefficients of the play, and so the times that one of them is put on its bound and the others fitted anew.
@@ -440,13 +443,16 @@ impl OtherRatio {
 }
 
 /// Refuses a ratio that the rows of a log contradict; says so alone where it may be rounded, or the output moves little
-/// and errs as one of a gear may.
-pub(crate) fn check_ratio_of(log: &Recording, ratio: f64) -> Result<Option<String>, CalibrationError> {
+/// and errs by less than `by_a_load_rad`, rms: a load that grows over a few rows looks the same.
+pub(crate) fn check_ratio_of(
+    log: &Recording,
+    ratio: f64,
+    by_a_load_rad: f64,
+) -> Result<Option<String>, CalibrationError> {
     let Some(other) = OtherRatio::of(log, ratio) else { return Ok(None) };
     let (from, to) = least_and_most(log.sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
     let moves_little = (to - from) / ratio.abs() < PERIOD_OF_THE_OUTPUT * std::f64::consts::TAU;
-    // A load that grows over a few rows looks the same.
-    let may_be_load = moves_little && other.error_rad < MOST_ERROR_RAD;
+    let may_be_load = moves_little && other.error_rad < by_a_load_rad;
     let is_far = (other.near - other.given).abs() >= 1.0;
     if is_far && !may_be_load {
         return Err(CalibrationError::Ratio { file: log.file.clone(), other });
@@ -480,8 +486,9 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
     prior.core_drive()?;
-    let said = files.iter().map(|file| check_ratio_of(file, prior.nominal.ratio)).collect::<Result<Vec<_>, _>>()?;
-    let said: Vec<String> = said.into_iter().flatten().collect();
+    let by_a_load_rad = if files.len() > 1 { LEAST_OF_OTHER_RATIO_RAD } else { 0.0 };
+    let said = files.iter().map(|file| check_ratio_of(file, prior.nominal.ratio, by_a_load_rad));
+    let said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     let parted: Vec<Recording>;
     let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
         parted = files.iter().flat_map(by_zeros).collect();

@@ -21,7 +21,7 @@ use thiserror::Error;
 use super::report::{Cause, Diagnosis};
 use super::{DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
 use super::{channels, quieted, torque_zero, zeros};
-use crate::calibrate::{CalibrationError, Prior, calibrate, check_ratio_of};
+use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrate, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
     CauseEntry, Evaluation, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError, TableKind,
@@ -334,7 +334,7 @@ pub fn parse_rows(
     let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
     // Teeth that skip look like another ratio.
     if recording.tooth_steps.is_empty() {
-        let said = check_ratio_of(&recording, subject.nominal.ratio)?;
+        let said = check_ratio_of(&recording, subject.nominal.ratio, MOST_ERROR_RAD)?;
         recording.notes.extend(said);
     }
     subject.take_away_known(&mut recording)?;
