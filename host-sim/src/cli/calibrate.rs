@@ -252,11 +252,11 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
         text += "each temperature is a log of its own, recorded when the drive has settled there; the encoders keep \
                  their zeros\n";
     }
-    text += "   log   output, deg           generator, turns      rpm   load, N.m     C   tells most of\n";
+    text += "   log   output, deg           generator, turns      rpm   load, N.m     C\n";
     for p in &planned.passes {
         let _ = writeln!(
             text,
-            "  {:>4}  {:>7.1} to {:>7.1}   {:>8.2} to {:>8.2} {:>7.1} {:>10.2} {:>6.1}   {}",
+            "  {:>4}  {:>7.1} to {:>7.1}   {:>8.2} to {:>8.2} {:>7.1} {:>10.2} {:>6.1}",
             p.log,
             p.from_output_deg,
             p.to_output_deg,
@@ -264,8 +264,7 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
             p.to_generator_turn,
             p.speed_rpm,
             p.torque_n_m,
-            p.temperature_c,
-            p.tells.as_str()
+            p.temperature_c
         );
     }
     for why in &planned.cannot {

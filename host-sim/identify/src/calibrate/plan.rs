@@ -161,8 +161,6 @@ pub struct Pass {
     pub torque_n_m: f64,
     /// Temperature, °C.
     pub temperature_c: f64,
-    /// The part that it informs most about.
-    pub tells: PartName,
 }
 
 /// `plan.json`.
@@ -211,12 +209,6 @@ pub struct Wide {
     pub half_width_arcsec: Option<f64>,
     /// Half width that is expected after these passes.
     pub expected_arcsec: f64,
-}
-
-/// A pass that may be made.
-struct Candidate {
-    pass: Pass,
-    tells: Gram,
 }
 
 /// Plans what to record of a drive, after a first log if there is one.
@@ -270,28 +262,28 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         let mut best: Option<(f64, usize, Vec<f64>)> = None;
         // The ends of the loads first, as a table ends where they do; then each load and temperature once before one is
         // repeated: the parts do not know all that they do.
-        let is_new = |c: &Candidate, of: fn(&Pass) -> f64| taken.iter().all(|pass: &Pass| of(pass) != of(&c.pass));
-        let news = |c: &Candidate| {
-            let new_load = is_new(c, |pass| pass.torque_n_m);
-            let new = usize::from(new_load) + usize::from(is_new(c, |pass| pass.temperature_c));
-            (new_load && bench.torque_n_m.contains(&c.pass.torque_n_m), new)
+        let news = |pass: &Pass| {
+            let new_load = taken.iter().all(|taken: &Pass| taken.torque_n_m != pass.torque_n_m);
+            let new_temperature = taken.iter().all(|taken| taken.temperature_c != pass.temperature_c);
+            let is_an_end = bench.torque_n_m.contains(&pass.torque_n_m);
+            (new_load && is_an_end, usize::from(new_load) + usize::from(new_temperature))
         };
-        let fits = |c: &Candidate| c.pass.duration_s <= left_s;
-        let most = candidates.iter().filter(|c| fits(c)).map(news).max();
-        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| fits(c) && Some(news(c)) == most) {
+        let fitting = || candidates.iter().enumerate().filter(|(_, (pass, _))| pass.duration_s <= left_s);
+        let most = fitting().map(|(_, (pass, _))| news(pass)).max();
+        for (k, (pass, information)) in fitting().filter(|(_, (pass, _))| Some(news(pass)) == most) {
             let mut with = known.clone();
-            with[candidate.pass.log - 1].add(&candidate.tells, 1.0);
+            with[pass.log - 1].add(information, 1.0);
             let then = of(&with)?;
-            let gain = (uncertain - asked.mean_variance(&then)) / candidate.pass.duration_s;
+            let gain = (uncertain - asked.mean_variance(&then)) / pass.duration_s;
             if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
                 best = Some((gain, k, then));
             }
         }
         let Some((_, k, then)) = best else { break };
-        let tells = asked.tells_most(&chosen, &now, &then);
-        known[candidates[k].pass.log - 1].add(&candidates[k].tells, 1.0);
-        left_s -= candidates[k].pass.duration_s;
-        taken.push(Pass { tells, ..candidates[k].pass });
+        let (pass, information) = &candidates[k];
+        known[pass.log - 1].add(information, 1.0);
+        left_s -= pass.duration_s;
+        taken.push(*pass);
         now = then;
     }
     if taken.len() == MOST_PASSES {
@@ -303,7 +295,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         )));
     }
     if taken.is_empty() {
-        let shortest = candidates.iter().map(|c| c.pass.duration_s).fold(f64::INFINITY, f64::min) / 60.0;
+        let shortest = candidates.iter().map(|(pass, _)| pass.duration_s).fold(f64::INFINITY, f64::min) / 60.0;
         return Err(CalibrationError::Known(format!(
             "--minutes: found {}, allowed: {shortest:.1} or more, the time of one pass there and back at {} rpm",
             bench.minutes, bench.speed_rpm
@@ -393,30 +385,10 @@ impl Asked {
         Asked(moment.first_free())
     }
 
-    /// Mean variance of some of the columns.
-    fn variance_of(&self, covariance: &[f64], columns: std::ops::Range<usize>) -> f64 {
-        let width = self.0.size - 1;
-        let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
-        pairs.map(|(i, j)| self.0.at(i, j) * covariance[i * width + j]).sum::<f64>().max(0.0)
-    }
-
     fn mean_variance(&self, covariance: &[f64]) -> f64 {
-        self.variance_of(covariance, 0..self.0.size - 1)
-    }
-
-    /// The part whose variance falls most.
-    fn tells_most(&self, chosen: &[PartName], before: &[f64], after: &[f64]) -> PartName {
-        let mut begin = 0;
-        let mut best = (f64::NEG_INFINITY, PartName::OutputAngle);
-        for one in chosen {
-            let columns = begin..begin + weights(*one).len();
-            begin = columns.end;
-            let gain = self.variance_of(before, columns.clone()) - self.variance_of(after, columns);
-            if gain > best.0 {
-                best = (gain, *one);
-            }
-        }
-        best.1
+        let width = self.0.size - 1;
+        let pairs = (0..width).flat_map(|i| (0..width).map(move |j| (i, j)));
+        pairs.map(|(i, j)| self.0.at(i, j) * covariance[i * width + j]).sum::<f64>().max(0.0)
     }
 }
 
@@ -493,8 +465,8 @@ fn spreading_rpm(fastest: f64, rate_hz: f64) -> f64 {
     speeds.max_by(|a, b| apart(*a).total_cmp(&apart(*b))).unwrap_or(fastest)
 }
 
-/// The passes that may be made.
-fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartName]) -> Vec<Candidate> {
+/// The passes that may be made, each with the sums of its rows.
+fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartName]) -> Vec<(Pass, Gram)> {
     let ratio = prior.nominal.ratio;
     let [begin, end] = bench.output_deg;
     let by_teeth = chosen.contains(&PartName::ToothPitch);
@@ -517,7 +489,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                 let duration_s = moving_s + 2.0 * REST_S;
                 let speed_rad_s = speed_rpm / 60.0 * TAU / ratio.abs();
                 let weight = moving_s * bench.rate_fitted_hz() / ROWS_OF_A_PASS as f64;
-                let mut tells = Gram::none(width_of(chosen) + 2);
+                let mut information = Gram::none(width_of(chosen) + 2);
                 for k in 0..ROWS_OF_A_PASS {
                     let way = if k % 2 == 0 { 1.0 } else { -1.0 };
                     let share = (k as f64 + 0.5) / ROWS_OF_A_PASS as f64;
@@ -534,7 +506,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                         speed_rad_s: way * speed_rad_s,
                         log: warmth,
                     };
-                    tells.add_row(&row_of_group(chosen, &at, scales, 0.0), weight);
+                    information.add_row(&row_of_group(chosen, &at, scales, 0.0), weight);
                 }
                 let pass = Pass {
                     log: warmth + 1,
@@ -547,9 +519,8 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                     speed_rpm,
                     torque_n_m,
                     temperature_c,
-                    tells: PartName::OutputAngle,
                 };
-                all.push(Candidate { pass, tells });
+                all.push((pass, information));
             }
         }
     }
