@@ -270,14 +270,6 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
     for why in &planned.cannot {
         let _ = writeln!(text, "not told by these: {why}");
     }
-    if !planned.widest.is_empty() {
-        text += "widest nodes, half width of 95 %, arcsec: after these logs, and expected\n";
-        for wide in &planned.widest {
-            let now = wide.half_width_arcsec.map_or("not recorded".to_owned(), |half| format!("{half:.2}"));
-            let _ =
-                writeln!(text, "  {:<16} {} {:.1}: {now}, {:.2}", wide.part, wide.of, wide.at, wide.expected_arcsec);
-        }
-    }
     if let Some(before) = planned.rms_before_arcsec {
         let _ = writeln!(
             text,

@@ -37,7 +37,7 @@ use interval::OF_95;
 pub use interval::{ModelUncertainty, Node, RowNoise};
 use parts::usual_arcsec;
 pub use parts::{PartName, Scales, State};
-pub use plan::{Bench, Pass, Planned, Wide, plan};
+pub use plan::{Bench, Pass, Planned, plan};
 pub use prior::Prior;
 pub use reading::{ByCore, Reading, ReadingDelay};
 use reading::{Delays, play_of_a_millisecond};

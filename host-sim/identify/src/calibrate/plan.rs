@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::interval::{Node, OF_95, RowNoise, planned_covariance, row_of_group, spread, width_of, widths};
+use super::interval::{Node, RowNoise, planned_covariance, row_of_group, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, Recorded, late_s};
 use super::{
@@ -46,10 +46,8 @@ const SPEEDS: usize = 101;
 const PLACES_OF_A_TURN: u32 = 24;
 /// Passes of a plan that nobody would drive by hand. *Guess*.
 const MOST_PASSES: usize = 5000;
-/// Nodes of a first log that are said to be widest.
-const WIDEST: usize = 8;
-/// Half widths beyond this, arcsec, are those of what was not recorded at all.
-pub(super) const NOT_RECORDED_ARCSEC: f64 = 2e3;
+/// An error beyond this, arcsec rms, is that of a part that was not recorded at all. *Guess*.
+const NOT_RECORDED_ARCSEC: f64 = 1e3;
 
 /// Limits of the bench, and the range that the table is to hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -187,28 +185,10 @@ pub struct Planned {
     pub rms_before_arcsec: Option<f64>,
     /// Half widths expected at the nodes.
     pub nodes: Vec<Node>,
-    /// The widest of them after the first log, widest first, with what is expected of them after these passes.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub widest: Vec<Wide>,
     /// Parts that this bench cannot tell, and why.
     pub cannot: Vec<String>,
     /// Command line, once known.
     pub command: String,
-}
-
-/// A node that a first log leaves wide.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Wide {
-    /// Part.
-    pub part: &'static str,
-    /// Which angle, torque or temperature.
-    pub of: &'static str,
-    /// Its value.
-    pub at: f64,
-    /// Half width after the first log, arcsec; absent if nothing was recorded that tells it.
-    pub half_width_arcsec: Option<f64>,
-    /// Half width that is expected after these passes.
-    pub expected_arcsec: f64,
 }
 
 /// Plans what to record of a drive, after a first log if there is one.
@@ -255,7 +235,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     };
 
     let mut now = of(&known)?;
-    let at_first = now.clone();
+    let rms_at_first = asked.mean_variance(&now).sqrt();
     let (mut left_s, mut taken) = (60.0 * bench.minutes, Vec::new());
     while taken.len() < MOST_PASSES {
         let uncertain = asked.mean_variance(&now);
@@ -302,20 +282,6 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         )));
     }
     let nodes = widths(&chosen, &scales, &now, None);
-    let rms = |covariance: &[f64]| asked.mean_variance(covariance).sqrt();
-    let mut widest = Vec::new();
-    if first.is_some() {
-        let then = widths(&chosen, &scales, &at_first, None);
-        let mut pairs: Vec<(&Node, &Node)> = then.iter().zip(&nodes).collect();
-        pairs.sort_by(|a, b| b.0.half_width_arcsec.total_cmp(&a.0.half_width_arcsec));
-        widest.extend(pairs.into_iter().take(WIDEST).map(|(then, node)| Wide {
-            part: then.part,
-            of: then.of,
-            at: then.at,
-            half_width_arcsec: Some(then.half_width_arcsec).filter(|half| *half < NOT_RECORDED_ARCSEC),
-            expected_arcsec: node.half_width_arcsec.min(then.half_width_arcsec),
-        }));
-    }
     let passes = in_order(taken);
     if chosen.contains(&PartName::WindUp) {
         let mut loads: Vec<f64> = passes.iter().map(|pass| pass.torque_n_m).collect();
@@ -345,10 +311,9 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         noise,
         minutes: passes.iter().map(|pass| pass.duration_s).sum::<f64>() / 60.0,
         passes,
-        expected_rms_arcsec: rms(&now),
-        rms_before_arcsec: first.map(|_| rms(&at_first)).filter(|rms| *rms < NOT_RECORDED_ARCSEC / OF_95),
+        expected_rms_arcsec: asked.mean_variance(&now).sqrt(),
+        rms_before_arcsec: first.map(|_| rms_at_first).filter(|rms| *rms < NOT_RECORDED_ARCSEC),
         nodes,
-        widest,
         cannot,
         command: String::new(),
     })

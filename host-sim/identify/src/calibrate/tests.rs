@@ -553,10 +553,14 @@ fn what_a_first_log_lacks_is_asked_for_next() {
     assert!(first.cannot.iter().any(|why| why.starts_with("wind_up")), "{:?}", first.cannot);
     let made = calibrate(&[played(&first, 1, law)], &prior).unwrap();
     let further = plan(&prior, &Bench { torque_n_m: [-30.0, 30.0], ..bench }, Some(&made)).unwrap();
-    assert!(further.widest.iter().all(|wide| wide.part == "wind_up" || wide.part == "play"), "{:?}", further.widest);
     assert!(further.passes.iter().all(|pass| (pass.torque_n_m - 10.0).abs() > 1.0), "{:?}", further.passes);
-    let wide = &further.widest[0];
-    assert!(wide.half_width_arcsec.is_none_or(|before| wide.expected_arcsec < 0.5 * before), "{wide:?}");
+    // The wind-up at the ends of the loads, which the first log leaves as open as that of any drive.
+    let widest = |planned: &Planned| {
+        let wind_up = planned.nodes.iter().filter(|node| node.part == "wind_up");
+        wind_up.map(|node| node.half_width_arcsec).fold(0.0, f64::max)
+    };
+    assert!(widest(&further) > 0.0 && widest(&further) < 30.0, "{:?}", further.nodes);
+    assert!(further.rms_before_arcsec.is_none_or(|before| further.expected_rms_arcsec < 0.5 * before), "{further:?}");
 }
 
 #[test]
