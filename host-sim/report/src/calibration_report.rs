@@ -41,7 +41,7 @@ fn headline(c: &Calibration) -> Headline {
         "The table of this unit has {kept} part{} in addition to the prior; the core with it leaves {{}} rms of \
          {{}} over all rows{}.",
         if kept == 1 { "" } else { "s" },
-        if c.reading_delay.is_some() { ", the delay between the readings taken out" } else { "" }
+        if c.has_delay() { ", the delay between the readings taken out" } else { "" }
     );
     Headline::new(
         RichText::filled(&words, &[(c.core.rms_after_arcsec, 3), (c.core.rms_before_arcsec, 3)]),
@@ -53,18 +53,14 @@ fn headline(c: &Calibration) -> Headline {
 fn left(made: &Calibrated) -> PageSection {
     let c = &made.calibration;
     let row = |name: &str, arcsec: f64| vec![RichText::new(name), RichText::arcsec(arcsec, 3)];
-    let measured = if c.reading_delay.is_some() { "As measured less the delay" } else { "As measured" };
-    let mut rows = vec![
+    let measured = if c.has_delay() { "As measured less the delay" } else { "As measured" };
+    let rows = vec![
         row(&format!("{measured}, rows in steady motion"), c.held_out.rms_before_arcsec),
         row("With what was known before, where nothing was fitted", c.held_out.rms_prior_arcsec),
         row("With the table, where nothing was fitted", c.held_out.rms_after_arcsec),
         row(&format!("{measured}, all rows"), c.core.rms_before_arcsec),
         row("Left by the core with this table, all rows", c.core.rms_after_arcsec),
     ];
-    if let Some(delay) = &c.reading_delay {
-        rows.push(row("As measured, with the delay, all rows", delay.rms_before_arcsec));
-        rows.push(row("Left by the core, which does not know the delay, all rows", delay.rms_after_arcsec));
-    }
     let every = made.shown.len().div_ceil(MOST_POINTS).max(1);
     let series = |name, colour, at: usize| {
         let points = made.shown.iter().step_by(every).map(|row| [row[0] / std::f64::consts::TAU, row[at]]);

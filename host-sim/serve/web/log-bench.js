@@ -515,13 +515,14 @@ backlash_arcsec = ${Number(now.backlash)}
       return;
     }
     const c = await fileJson(`${job.out}/calibration.json`);
+    const late = c.readings.some((reading) => reading.name === "delay");
     const gain = 100 * (1 - c.held_out.rms_after_arcsec / c.held_out.rms_before_arcsec);
     calibrated.replaceChildren(
       el(
         "p",
         { class: "verdict" },
         errorOf(c.held_out.rms_before_arcsec),
-        ` rms ${c.reading_delay ? "as measured less a reading delay" : "as measured"}, `,
+        ` rms ${late ? "as measured less a reading delay" : "as measured"}, `,
         errorOf(c.held_out.rms_after_arcsec),
         ` with the table where nothing was fitted: ${number(gain, 3)} % less.`,
       ),

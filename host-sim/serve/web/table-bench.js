@@ -331,6 +331,7 @@ export async function certificate(view, asked) {
       .slice(0, 2)
       .filter(({ amplitude }) => amplitude >= NAMED_ARCSEC),
   );
+  const late = c.readings.some((reading) => reading.name === "delay");
   view.append(
     el("h1", { text: "Certificate of a unit" }),
     el(
@@ -342,7 +343,7 @@ export async function certificate(view, asked) {
       "What was measured, and what the table leaves",
       ["", "rms"],
       [
-        [c.reading_delay ? "As measured less a reading delay" : "As measured", errorOf(c.held_out.rms_before_arcsec)],
+        [late ? "As measured less a reading delay" : "As measured", errorOf(c.held_out.rms_before_arcsec)],
         ["With the table, where nothing was fitted", errorOf(c.held_out.rms_after_arcsec)],
         ["Left by the core, all rows, reversals among them", errorOf(c.core.rms_after_arcsec)],
         ["The table holds the error to, 95 %", errorOf(c.half_width_arcsec)],

@@ -343,7 +343,7 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
             found.generator_zero_deg, found.generator_half_width_deg, found.repeats_deg, found.why
         );
     }
-    let as_measured = if c.reading_delay.is_some() { "as measured less the delay" } else { "as measured" };
+    let as_measured = if c.has_delay() { "as measured less the delay" } else { "as measured" };
     let removed = 100.0 * (1.0 - core.rms_after_arcsec / core.rms_before_arcsec);
     let _ = writeln!(
         text,

@@ -39,8 +39,8 @@ use parts::usual_arcsec;
 pub use parts::{PartName, Scales, State};
 pub use plan::{Bench, Pass, Planned, plan};
 pub use prior::Prior;
-pub use reading::{ByCore, Reading, ReadingDelay};
-use reading::{Delays, play_of_a_millisecond};
+pub use reading::{ByCore, Reading};
+use reading::{DELAY, Delays, delay_note, play_of_a_millisecond};
 pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
 
@@ -239,7 +239,7 @@ pub struct PartSays {
 /// Errors in folds that took no part, rows in steady motion with both angles at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HeldOut {
-    /// As measured, each file's zero taken out, and a [delay](ReadingDelay) between the readings.
+    /// As measured, each file's zero taken out, and a delay between the [readings](Reading).
     pub rms_before_arcsec: f64,
     /// With the nominal model or table alone.
     pub rms_prior_arcsec: f64,
@@ -327,9 +327,6 @@ pub struct Calibration {
     pub held_out: HeldOut,
     /// The core over all rows, both angles at one instant.
     pub core: ByCore,
-    /// The delay between the readings, if these logs tell one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reading_delay: Option<ReadingDelay>,
     /// Play that a delay of a millisecond would look like, arcsec, where the logs keep to one pace and cannot tell
     /// the two apart.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -376,6 +373,14 @@ pub struct Calibration {
     pub notes: Vec<String>,
     /// Command line, once known.
     pub command: String,
+}
+
+impl Calibration {
+    /// Whether a log has a delay between the readings of the two angles, which is taken out of all errors.
+    #[must_use]
+    pub fn has_delay(&self) -> bool {
+        self.readings.iter().any(|reading| reading.name == DELAY)
+    }
 }
 
 /// A table with what is said of it.
@@ -503,7 +508,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     if let Some(files) = &at_one_instant {
         rows = settled(files, prior, &recorded);
     }
-    let logs = Logs { measured: files, at_one_instant: at_one_instant.as_deref().unwrap_or(files), delays };
+    let at_one_instant = at_one_instant.as_deref().unwrap_or(files);
     // A load in the dead zone of a table decides no flank.
     let own_n_m = prior.table.map_or(0.0, dead_zone_n_m);
     recorded.scales.friction_n_m = recorded.scales.friction_n_m.max(own_n_m);
@@ -514,16 +519,9 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     let told = alignment.as_ref().filter(|found| found.told);
     let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
     let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
-    let made = fit_with_table(logs.at_one_instant, prior, (&rows, &recorded))
-        .and_then(|made| report(&logs, (prior, alignment), &recorded, made, said));
+    let made = fit_with_table(at_one_instant, prior, (&rows, &recorded))
+        .and_then(|made| report((at_one_instant, delays), (prior, alignment), &recorded, made, said));
     made.map_err(|error| with_faults(error, files, &notes))
-}
-
-/// Logs with delays between the readings, and without.
-struct Logs<'a> {
-    measured: &'a [Recording],
-    at_one_instant: &'a [Recording],
-    delays: Option<Delays>,
 }
 
 /// A file in pieces, each with one zero.
@@ -573,15 +571,14 @@ fn fit_with_table(
     })
 }
 
-/// What is said of a table and of the fit that it is of; `said` is noted of the ratio.
+/// Report on a table and the fit that it is of, to logs whose delays were taken out; `said` is noted of the ratio.
 fn report(
-    logs: &Logs<'_>,
+    (files, delays): (&[Recording], Option<Delays>),
     (prior, alignment): (&Prior<'_>, Option<Alignment>),
     recorded: &Recorded,
     (fitted, made): (Fitted, MadeTable),
     said: Vec<String>,
 ) -> Result<Calibrated, CalibrationError> {
-    let files = logs.at_one_instant;
     let parts = fitted.judged(recorded, prior);
     let agreement = fitted.agreement();
     let turned = agreement.as_ref().and_then(|agreement| {
@@ -591,12 +588,11 @@ fn report(
     let Fitted { rows, folds, model, held_out, .. } = fitted;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = ByCore::of(files, &image, recorded);
-    let reading_delay = logs.delays.as_ref().and_then(|delays| delays.shown(logs.measured, &image, recorded));
-    let mut readings = logs.delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
+    let mut readings = delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
     let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, recorded, prior);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(said);
-    notes.extend(reading_delay.as_ref().map(|delay| delay.note(&readings, files.len())));
+    notes.extend(delay_note(&readings, files.len()));
     // What is known by its angle needs no guess.
     notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
     notes.extend(remarks(prior, recorded, &model, play_of_a_millisecond_arcsec));
@@ -604,16 +600,16 @@ fn report(
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
     let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
     let none = || vec![0.0; files.len()];
-    let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
+    let of_columns = delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
     let left_out_arcsec = held_out.rms_after_arcsec;
     let correlation = rows.load_with_output_angle();
     let beside = collinear(&rows, &model, correlation);
-    let known = ModelUncertainty::of(&rows.rows, (&model, &beside), &delays, recorded.coarse_rad, left_out_arcsec)
+    let known = ModelUncertainty::of(&rows.rows, (&model, &beside), &of_columns, recorded.coarse_rad, left_out_arcsec)
         .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
     // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
     // paces that were recorded.
     let at_rest = |at: State| State { speed_rad_s: 0.0, ..at };
-    let as_fitted = |at: State| if logs.delays.is_some() { at_rest(at) } else { at };
+    let as_fitted = |at: State| if delays.is_some() { at_rest(at) } else { at };
     let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
     let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
     let anywhere = anywhere(&rows, recorded, prior);
@@ -643,7 +639,6 @@ fn report(
         folds: folds.all().len(),
         held_out,
         core,
-        reading_delay,
         play_of_a_millisecond_arcsec,
         readings,
         parts,

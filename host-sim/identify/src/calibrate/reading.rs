@@ -17,7 +17,10 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 /// A delay is not told from play if its standard deviation is more than this share of that before the rows. *Guess*.
 const UNTOLD: f64 = 0.25;
 
-/// A number of the reading, fitted beside the parts of the table and not held by it.
+/// Name of the reading of a delay.
+pub(super) const DELAY: &str = "delay";
+
+/// A number of the reading, fitted with the parts of the table and not held by it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
     /// `delay` (s, positive where the output of a row is older than its generator) or `offset` (arcsec, of the output).
@@ -29,21 +32,6 @@ pub struct Reading {
     pub value: f64,
     /// Standard deviation.
     pub std: f64,
-}
-
-/// A delay between the readings of the two angles: the largest of the logs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ReadingDelay {
-    /// The log.
-    pub file: String,
-    /// By how much the output of a row is older than its generator, s; negative where the generator is the older.
-    pub delay_s: f64,
-    /// Half width of the interval that holds it with 95 %, s.
-    pub half_width_s: f64,
-    /// Error of all rows as measured, the delays among it, arcsec rms.
-    pub rms_before_arcsec: f64,
-    /// Residual of the core in the rows as measured: it does not know the delays. Arcsec rms.
-    pub rms_after_arcsec: f64,
 }
 
 /// The delay of each log with its standard deviation, s; `None` of a log that shows none.
@@ -147,46 +135,31 @@ impl Delays {
     pub(crate) fn readings(&self, files: &[Recording]) -> Vec<Reading> {
         let reading = |(file, delay): (&Recording, &Option<[f64; 2]>)| {
             let [value, std] = (*delay)?;
-            Some(Reading { name: "delay", file: Some(file.file.clone()), value, std })
+            Some(Reading { name: DELAY, file: Some(file.file.clone()), value, std })
         };
         files.iter().zip(&self.0).filter_map(reading).collect()
     }
-
-    /// Their effect on the rows of these logs, in which they are, beside this table.
-    pub(crate) fn shown(&self, files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> Option<ReadingDelay> {
-        let ByCore { rms_before_arcsec, rms_after_arcsec, .. } = ByCore::of(files, table, recorded);
-        let largest = self.readings(files).into_iter().max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))?;
-        Some(ReadingDelay {
-            file: largest.file.unwrap_or_default(),
-            delay_s: largest.value,
-            half_width_s: OF_95 * largest.std,
-            rms_before_arcsec,
-            rms_after_arcsec,
-        })
-    }
 }
 
-impl ReadingDelay {
-    /// Note on the delays of logs, of which this is the largest.
-    pub(super) fn note(&self, readings: &[Reading], logs: usize) -> String {
-        let of_log = |reading: &Reading| {
-            let (old, new) = if reading.value > 0.0 { ("output", "generator") } else { ("generator", "output") };
-            let file = reading.file.as_deref().filter(|_| logs > 1).map_or(String::new(), |file| format!(" of {file}"));
-            format!(
-                "in each row{file} the {old} is {:.3} ± {:.3} ms older than the {new}",
-                1e3 * reading.value.abs(),
-                1e3 * OF_95 * reading.std
-            )
-        };
+/// Note on the delays among the readings of some logs, if there is one.
+pub(super) fn delay_note(readings: &[Reading], logs: usize) -> Option<String> {
+    let of_log = |reading: &Reading| {
+        let (old, new) = if reading.value > 0.0 { ("output", "generator") } else { ("generator", "output") };
+        let file = reading.file.as_deref().filter(|_| logs > 1).map_or(String::new(), |file| format!(" of {file}"));
         format!(
-            "{}: what that does goes with the speed, which no table knows, so the table is fitted without it. Over all \
-             rows as measured {:.2} arcsec rms, {:.2} with the table and the delay still there; read both at one \
-             instant, or tell the controller of the delay",
-            readings.iter().map(of_log).collect::<Vec<_>>().join("; "),
-            self.rms_before_arcsec,
-            self.rms_after_arcsec
+            "in each row{file} the {old} is {:.3} ± {:.3} ms older than the {new}",
+            1e3 * reading.value.abs(),
+            1e3 * OF_95 * reading.std
         )
-    }
+    };
+    let delays: Vec<String> = readings.iter().filter(|reading| reading.name == DELAY).map(of_log).collect();
+    (!delays.is_empty()).then(|| {
+        format!(
+            "{}: the effect grows with the speed, which no table knows, so the table is fitted without it; read both \
+             at one instant, or give the controller the delay",
+            delays.join("; ")
+        )
+    })
 }
 
 /// What a delay would do that these rows cannot tell from play, arcsec of play for a millisecond; none where they tell
