@@ -15,28 +15,6 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
 use flexspline_mechanics::drive::DriveError;
 
-/// Which wheel does not turn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fixed {
-    /// The flexspline; the circular spline is the output.
-    Flexspline,
-    /// The circular spline; the flexspline is the output.
-    CircularSpline,
-}
-
-impl Fixed {
-    const ALL: [Fixed; 2] = [Fixed::Flexspline, Fixed::CircularSpline];
-
-    /// Its name in a file.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Fixed::Flexspline => "flexspline",
-            Fixed::CircularSpline => "circular_spline",
-        }
-    }
-}
-
 /// The farthest that a drive winds up, rad: torques beyond are in another unit. *Source*: 69 arcmin at the ratcheting
 /// torque of the softest drive of the catalogue (CSG-14-80), the largest of 44.
 const FARTHEST_WIND_UP_RAD: f64 = 0.02;
@@ -49,7 +27,7 @@ pub struct Teeth {
     /// Of the circular spline.
     pub circular_spline: u32,
     /// Which of them is fixed.
-    pub fixed: Fixed,
+    pub fixed: FixedMember,
 }
 
 impl Teeth {
@@ -58,19 +36,15 @@ impl Teeth {
     /// # Errors
     /// No pair of wheels has these teeth.
     pub(crate) fn core_drive(self) -> Result<flexspline::Drive, flexspline::DriveError> {
-        let fixed = match self.fixed {
-            Fixed::Flexspline => FixedMember::Flexspline,
-            Fixed::CircularSpline => FixedMember::CircularSpline,
-        };
         let narrow = |count: u32| u16::try_from(count).unwrap_or(u16::MAX);
-        flexspline::Drive::new(narrow(self.flexspline), narrow(self.circular_spline), fixed)
+        flexspline::Drive::new(narrow(self.flexspline), narrow(self.circular_spline), self.fixed)
     }
 
     /// Of the wheel that is the output.
     pub(crate) const fn of_output(self) -> u32 {
         match self.fixed {
-            Fixed::Flexspline => self.circular_spline,
-            Fixed::CircularSpline => self.flexspline,
+            FixedMember::Flexspline => self.circular_spline,
+            FixedMember::CircularSpline => self.flexspline,
         }
     }
 }
@@ -146,7 +120,7 @@ impl Nominal {
     #[must_use]
     pub fn gear(&self) -> Gear {
         let gear = match self.teeth {
-            Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == Fixed::Flexspline),
+            Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == FixedMember::Flexspline),
             None => Gear::of_ratio(self.ratio),
         };
         let stiffest = self.stiffness.iter().fold(f64::INFINITY, |_, [_, stiffness]| *stiffness);
@@ -183,9 +157,9 @@ impl Nominal {
         self.teeth.unwrap_or_else(|| {
             let more = (2.0 * self.ratio.abs()).round().max(3.0) as u32;
             if self.ratio > 0.0 {
-                Teeth { flexspline: more - 2, circular_spline: more, fixed: Fixed::Flexspline }
+                Teeth { flexspline: more - 2, circular_spline: more, fixed: FixedMember::Flexspline }
             } else {
-                Teeth { flexspline: more, circular_spline: more + 2, fixed: Fixed::CircularSpline }
+                Teeth { flexspline: more, circular_spline: more + 2, fixed: FixedMember::CircularSpline }
             }
         })
     }
@@ -209,11 +183,10 @@ impl Nominal {
     #[must_use]
     pub fn of_table(table: &Table<'_>) -> Nominal {
         let drive = table.drive();
-        let fixed = if drive.fixed() == FixedMember::Flexspline { Fixed::Flexspline } else { Fixed::CircularSpline };
         let teeth = Teeth {
             flexspline: u32::from(drive.flexspline_teeth()),
             circular_spline: u32::from(drive.circular_spline_teeth()),
-            fixed,
+            fixed: drive.fixed(),
         };
         let [low, high] = table.temperature_range_c();
         let temperature = f32::midpoint(low, high).clamp(low, high);
@@ -444,15 +417,16 @@ fn ratio_and_teeth(file: &mut TomlFile<'_>, drive: &Section<'_, '_>) -> Option<(
                     ..refused
                 })
             })?;
-            let names = Fixed::ALL.map(|fixed| (fixed.name(), fixed));
+            let names =
+                [("flexspline", FixedMember::Flexspline), ("circular_spline", FixedMember::CircularSpline)];
             let fixed = match drive.has("fixed") {
                 true => drive.needed(file, "fixed", |v| one_of(&names, v))?,
-                false => Fixed::Flexspline,
+                false => FixedMember::Flexspline,
             };
             let waves = f64::from(c - f);
             let ratio = match fixed {
-                Fixed::Flexspline => f64::from(c) / waves,
-                Fixed::CircularSpline => -f64::from(f) / waves,
+                FixedMember::Flexspline => f64::from(c) / waves,
+                FixedMember::CircularSpline => -f64::from(f) / waves,
             };
             Some((ratio, Some(Teeth { flexspline: f, circular_spline: c, fixed })))
         }
@@ -499,8 +473,8 @@ mod tests {
         let nominal = Nominal::from_toml("n.toml", by_ratio).unwrap();
         assert_eq!((nominal.ratio, nominal.teeth, nominal.friction_torque_n_m), (-6.0, None, 0.0));
         let teeth = |ratio: f64| Nominal { ratio, ..nominal.clone() }.teeth_or_of_two_waves();
-        assert_eq!(teeth(95.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::Flexspline });
-        assert_eq!(teeth(-94.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::CircularSpline });
+        assert_eq!(teeth(95.0), Teeth { flexspline: 188, circular_spline: 190, fixed: FixedMember::Flexspline });
+        assert_eq!(teeth(-94.0), Teeth { flexspline: 188, circular_spline: 190, fixed: FixedMember::CircularSpline });
     }
 
     #[test]
@@ -509,7 +483,7 @@ mod tests {
         let nominal = Nominal::from_toml("n.toml", &text).unwrap();
         assert_eq!((nominal.ratio, nominal.backlash_arcsec, nominal.friction_torque_n_m), (95.0, 60.0, 1.5));
         assert_eq!((nominal.stiffness.len(), nominal.harmonics.len(), nominal.spread), (3, 1, USUAL_SPREAD));
-        assert_eq!(nominal.teeth.map(|t| t.fixed), Some(Fixed::Flexspline));
+        assert_eq!(nominal.teeth.map(|t| t.fixed), Some(FixedMember::Flexspline));
         for key in KEYS {
             assert!(text.contains(key.rsplit('.').next().unwrap()), "the template says nothing of {key}");
         }

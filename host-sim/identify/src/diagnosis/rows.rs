@@ -6,8 +6,9 @@ use std::ops::Range;
 
 pub(crate) use crate::least_squares::{add_scaled, combined};
 pub(crate) use crate::measurement::rms;
+use flexspline::FixedMember;
 use crate::measurement::{Session, neighbours, quantile_of, rates};
-use crate::nominal::{Fixed, Nominal};
+use crate::nominal::Nominal;
 pub(super) use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -239,8 +240,8 @@ impl Rows {
         let against = |moves: bool| -> Vec<f64> {
             self.generator.iter().zip(&self.output).map(|(psi, out)| psi - if moves { *out } else { 0.0 }).collect()
         };
-        self.on_flexspline = against(turning == Some(Fixed::CircularSpline));
-        self.on_circular_spline = against(turning != Some(Fixed::CircularSpline));
+        self.on_flexspline = against(turning == Some(FixedMember::CircularSpline));
+        self.on_circular_spline = against(turning != Some(FixedMember::CircularSpline));
     }
 
     /// Rows.

@@ -17,6 +17,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use flexspline::FixedMember;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -27,7 +28,7 @@ use crate::diagnosis::prepare::Jump;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
 use crate::diagnosis::{Extended, FittedLaw, added_by};
 use crate::measurement::Session;
-use crate::nominal::{Fixed, Harmonic, Nominal, Teeth};
+use crate::nominal::{Harmonic, Nominal, Teeth};
 use crate::synthesize::{Effect, EffectError, Sizes, added_arcsec, completed};
 use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, each_of, entries_of, one_of, text as text_of};
 use flexspline_mechanics::drive::{DriveError, Problem};
@@ -151,7 +152,7 @@ impl Model {
         let n = &self.nominal;
         let drive = match n.teeth {
             Some(Teeth { flexspline, circular_spline, fixed }) => {
-                let fixed = if fixed == Fixed::Flexspline { "flexspline" } else { "circular_spline" };
+                let fixed = if fixed == FixedMember::Flexspline { "flexspline" } else { "circular_spline" };
                 format!(
                     "flexspline_teeth = {flexspline}\ncircular_spline_teeth = {circular_spline}\nfixed = \"{fixed}\""
                 )

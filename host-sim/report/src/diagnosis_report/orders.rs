@@ -1,14 +1,15 @@
 //! Which orders each cause makes, for the marks in the spectra.
 
+use flexspline::FixedMember;
 use flexspline_identify::causes::{Multiple, ParameterName, Turn};
 use flexspline_identify::diagnosis::report::Cause;
-use flexspline_identify::nominal::{Fixed, Nominal};
+use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::Axis;
 
 /// Turns of what an order is counted against in a generator turn.
 fn per_generator_turn(turn: Turn, cause: &Cause, nominal: &Nominal) -> f64 {
     let against_output = Axis::GeneratorLessOutput.turns_per_generator_turn(nominal.ratio);
-    let flexspline_turns = nominal.teeth.is_some_and(|teeth| teeth.fixed == Fixed::CircularSpline);
+    let flexspline_turns = nominal.teeth.is_some_and(|teeth| teeth.fixed == FixedMember::CircularSpline);
     let on_flexspline = if flexspline_turns { against_output } else { 1.0 };
     let on_circular_spline = if flexspline_turns { 1.0 } else { against_output };
     match turn {
@@ -77,7 +78,7 @@ mod tests {
         // With the circular spline fixed it is the flexspline that turns.
         let mut other = nominal.clone();
         other.teeth =
-            other.teeth.map(|teeth| flexspline_identify::nominal::Teeth { fixed: Fixed::CircularSpline, ..teeth });
+            other.teeth.map(|teeth| flexspline_identify::nominal::Teeth { fixed: FixedMember::CircularSpline, ..teeth });
         other.ratio = -94.0;
         assert!((along(&ring, Axis::Generator, &other)[0] - 2.0).abs() < 1e-9);
         let runout = along(&cause(CauseName::FlexsplineRunout), Axis::Generator, &other);

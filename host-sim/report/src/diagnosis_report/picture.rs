@@ -8,8 +8,8 @@ use crate::page::{
     ChartAxis, ChartSeries, Detail, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection,
     RichText, Upright, significant,
 };
+use flexspline::FixedMember;
 use flexspline_base::robust::{least_and_most, median_of};
-use flexspline_identify::nominal::Fixed;
 use flexspline_identify::residual::Axis as Angle;
 
 /// Cells of the map, across and up.
@@ -157,7 +157,7 @@ impl DiagnosisKnown<'_> {
 
     /// The symbol of an angle, and the parts that turn with it.
     fn angle_name(&self, angle: Angle) -> (&'static str, &'static str) {
-        let flexspline_turns = self.sources.nominal.teeth.is_some_and(|teeth| teeth.fixed == Fixed::CircularSpline);
+        let flexspline_turns = self.sources.nominal.teeth.is_some_and(|teeth| teeth.fixed == FixedMember::CircularSpline);
         match angle {
             Angle::Generator if flexspline_turns => ("ψ", "generator and circular spline"),
             Angle::Generator => ("ψ", "generator and flexspline"),

@@ -10,7 +10,8 @@ use std::f64::consts::TAU;
 
 use std::f64::consts::PI;
 
-use crate::nominal::{Fixed, Nominal};
+use flexspline::FixedMember;
+use crate::nominal::Nominal;
 
 use super::displaced::displaced;
 use super::{
@@ -255,7 +256,7 @@ fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
 /// Whether a wheel does not turn: what is cut into it comes back once in each turn of the generator.
 fn is_standing(nominal: &Nominal, of: Angle) -> bool {
     match nominal.teeth.map(|teeth| teeth.fixed) {
-        Some(Fixed::CircularSpline) => of == Angle::CircularSpline,
+        Some(FixedMember::CircularSpline) => of == Angle::CircularSpline,
         _ => of == Angle::Flexspline,
     }
 }
