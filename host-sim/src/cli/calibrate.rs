@@ -357,13 +357,6 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
          {:.2} with the parts",
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
-    let width = c.play_width_arcsec;
-    let _ = writeln!(
-        text,
-        "whole play of the table, arcsec: {:.1} between the directions without load, {:.1} from {:.2} to {:.2} N.m in \
-         motion one way (both flanks, wind-up among them)",
-        width.between_directions_arcsec, width.between_flanks_arcsec, -width.within_n_m, width.within_n_m
-    );
     let _ = writeln!(text, "{}", held(c));
     let _ = writeln!(
         text,

@@ -247,33 +247,6 @@ pub struct HeldOut {
     pub rms_after_arcsec: f64,
 }
 
-/// Play of a table where the load changes its sign, arcsec, prior and all parts together.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PlayWidth {
-    /// Without load, from motion one way to motion the other.
-    pub between_directions_arcsec: f64,
-    /// In motion one way, from a load of `within_n_m` against the motion to one as large with it: both flanks and the
-    /// wind-up between, as these have no clear border.
-    pub between_flanks_arcsec: f64,
-    /// See above.
-    pub within_n_m: f64,
-}
-
-/// The whole play of what was fitted. One way, a light load either side of what decides the flank.
-fn play_width(model: &Model, prior: &Prior<'_>, recorded: &Recorded) -> PlayWidth {
-    let friction = recorded.scales.friction_n_m;
-    let within_n_m = recorded.scales.torque_n_m.iter().fold(2.0 * friction, |within, end| within.min(end.abs()));
-    let error = |torque_n_m: f64, way: f64| {
-        let at = State { torque_n_m, temperature_c: recorded.temperature_c, way, ..State::default() };
-        model.says_arcsec(&at, prior)
-    };
-    PlayWidth {
-        between_directions_arcsec: error(0.0, -1.0) - error(0.0, 1.0),
-        between_flanks_arcsec: error(within_n_m, 1.0) - error(-within_n_m, 1.0),
-        within_n_m,
-    }
-}
-
 /// States spread over what the table of these rows is to hold.
 fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> Vec<State> {
     let (from, to) = least_and_most(rows.rows.iter().map(|row| row.at.output_rad));
@@ -346,8 +319,6 @@ pub struct Calibration {
     pub half_width_as_recorded_arcsec: f64,
     /// As the first, at any other pace and at rest: with all that a delay which these logs do not show may have done.
     pub half_width_at_another_pace_arcsec: f64,
-    /// The whole play of the table, wind-up and all.
-    pub play_width_arcsec: PlayWidth,
     /// Phase of the table that was known before, if one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<Alignment>,
@@ -647,7 +618,6 @@ fn report(
         half_width_arcsec,
         half_width_as_recorded_arcsec,
         half_width_at_another_pace_arcsec,
-        play_width_arcsec: play_width(&model, prior, recorded),
         alignment,
         output_zeros,
         zero_cost: cost(&image),

@@ -229,8 +229,8 @@ fn another_pace_back_is_no_second_pace_and_play_is_found() {
     }
     let c = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap().calibration;
     assert!(kept(&c).contains(&"play") && !c.has_delay(), "{:?}", c.parts);
-    let whole = c.play_width_arcsec.between_directions_arcsec;
-    assert!((whole - 40.0).abs() < 1.0, "{whole}");
+    let unloaded = c.nodes.iter().find(|node| node.part == "play" && node.at == 0.0).unwrap();
+    assert!((unloaded.value_arcsec.unwrap() + 20.0).abs() < 0.5, "{unloaded:?}");
 }
 
 /// Logs at one load each, and each with a zero that is free, say nothing of the wind-up.
