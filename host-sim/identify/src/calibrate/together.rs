@@ -105,10 +105,9 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
 }
 
 /// A generator that is turned back by what is found has to leave less than this share of the squares, and no more than
-/// the first share of the rms of each log alone: else it is not the zero alone that differs, up to the second the curve
-/// of another unit. Guesses.
+/// this share of the rms of each log alone: else it is not the zero alone that differs. Guesses.
 const TURNED_BACK: f64 = 0.8;
-const AS_ALONE: [f64; 2] = [1.1, 1.3];
+const AS_ALONE: f64 = 1.1;
 /// Whole turns are told if without them this multiple of the squares is left, at least. *Guess*.
 const OTHER_TURN: f64 = 1.2;
 /// Logs that are turned, at most: pieces of one log with zeros of their own are many, and their generator is one.
@@ -158,21 +157,13 @@ pub(super) fn generators_turned(
     }
     let rows = rows.less(prior);
     let Agreement { alone_arcsec, together_arcsec: after, .. } = Agreement::of(&rows, parts, &model.scales)?;
-    let is_near = after * after < TURNED_BACK * before * before && after < AS_ALONE[1] * alone_arcsec;
+    let is_near = after * after < TURNED_BACK * before * before && after < AS_ALONE * alone_arcsec;
     is_near.then(|| {
         let of = |(file, turned): (&Recording, &f64)| {
             let turns = if turned.abs() > TAU { format!(" ({:+.2} turns)", turned / TAU) } else { String::new() };
             format!("{:+.2} deg{turns} in {}", turned.to_degrees(), file.file)
         };
         let list: Vec<String> = files.iter().zip(&turned).skip(1).map(of).collect();
-        if after >= AS_ALONE[0] * alone_arcsec {
-            return format!(
-                "the logs look like those of unlike units, or of one that has changed: all together are fitted to \
-                 {before:.2} arcsec rms, with each generator turned as fits best to {after:.2}, each alone to \
-                 {alone_arcsec:.2}; is one of {} another unit?",
-                files.iter().map(|file| file.file.as_str()).collect::<Vec<_>>().join(", ")
-            );
-        }
         format!(
             "the zero of the generator is not the same in all logs: against {} it reads {}; turned back they would \
              leave {after:.2} arcsec rms instead of {before:.2}. Home it in the same place before each log, or give \
