@@ -99,7 +99,7 @@ fn reading() -> PageSection {
     PageSection::reading(vec![PageBlock::paragraph(
         "A table of one unit says what its error is, not why: two causes that look alike in these logs are one part \
          here. It holds for the torques, temperatures and angles recorded. The figures where nothing was fitted leave \
-         out each file, session or block in turn; which parts there are, how smooth they are and their coefficients \
+         out each file or block in turn; which parts there are, how smooth they are and their coefficients \
          are then found without it.",
     )])
 }

@@ -24,7 +24,7 @@ use flexspline_report::calibration_report;
 ///
 /// Subtracts the nominal model or table from the measurement and fits the residual with smooth parts: wind-up over
 /// torque, play by direction, curves over generator, tooth and output angle, temperature. A part is kept if it improves
-/// the prediction of files, sessions or blocks that were left out of the fit. Writes calibrated.fxt, .h and .rs,
+/// the prediction of files or blocks that were left out of the fit. Writes calibrated.fxt, .h and .rs,
 /// calibration.json and report.html.
 ///
 /// --plan reports what to record before there is a log: the most informative passes of the bench in the time available,

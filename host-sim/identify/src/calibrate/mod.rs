@@ -8,7 +8,7 @@
 //! Physics first: the nominal model, or a table, is the prior, and is taken from what was measured. What remains is
 //! fitted by smooth
 //! [parts](PartName), each with a penalty against wrinkles. Which parts are kept, and how smooth they are, is decided
-//! by what fits leave in files, sessions or blocks that they did not see; the figure given for the whole is nested:
+//! by what fits leave in files or blocks that they did not see; the figure given for the whole is nested:
 //! choice, penalties and fit are all made without the fold that they are judged in. No part is fitted where nothing was
 //! recorded that could show it, and no table is made that leaves more than a simpler one.
 
@@ -292,7 +292,7 @@ pub struct Calibration {
     pub rows_fitted: usize,
     /// See above.
     pub rows_unsettled: usize,
-    /// Folds left out in turn: `files`, `sessions` or `blocks`.
+    /// Folds left out in turn: `files` or `blocks`.
     pub left_out: &'static str,
     /// How many of them.
     pub folds: usize,
@@ -604,7 +604,6 @@ fn report(
         rows_unsettled: rows.unsettled,
         left_out: match rows.folds {
             FoldKind::Files => "files",
-            FoldKind::Sessions => "sessions",
             FoldKind::Blocks => "blocks",
         },
         folds: folds.all().len(),

@@ -16,11 +16,8 @@ const ROUNDS: usize = 4;
 /// What a fold was recorded at is within what the others were by this share of all loads: beyond it no table is asked.
 /// A guess.
 const BEYOND_OTHERS: f64 = 0.1;
-/// With this number of files, or sessions, each is a fold.
-const ENOUGH_SESSIONS: usize = 3;
-/// Left-out sessions are folds if none of them holds more than this share of the rows: without a larger one the rest is
-/// another record. A guess.
-const LARGEST_SESSION: f64 = 0.4;
+/// With this number of files each is a fold.
+const ENOUGH_FILES: usize = 3;
 /// Rows that are fitted, at most; of longer records every n-th.
 pub(super) const MOST_ROWS: usize = 40_000;
 /// A reversal is one if the generator goes back by this share of its usual step.
@@ -32,7 +29,6 @@ const SETTLED: f64 = 1.5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FoldKind {
     Files,
-    Sessions,
     Blocks,
 }
 
@@ -238,9 +234,6 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let total: usize = files.iter().flat_map(|file| &file.sessions).map(Session::len).sum();
     let every = one_in(total);
-    let sessions: usize = files.iter().map(|file| file.sessions.len()).sum();
-    let largest = files.iter().flat_map(|file| &file.sessions).map(Session::len).max().unwrap_or(0);
-    let by_sessions = sessions >= ENOUGH_SESSIONS && largest as f64 <= LARGEST_SESSION * total as f64;
     let mut all = Rows {
         rows: Vec::new(),
         measured_means_arcsec: Vec::new(),
@@ -249,7 +242,6 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
         of: total,
         unsettled: 0,
     };
-    let (mut session_of, mut session_number) = (Vec::new(), 0);
     for (zero, file) in files.iter().enumerate() {
         let begin = all.rows.len();
         for session in &file.sessions {
@@ -279,9 +271,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                 };
                 let measured_arcsec = session.error_rad[k] * ARCSEC_PER_RAD;
                 all.rows.push(Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0 });
-                session_of.push(session_number);
             }
-            session_number += 1;
         }
         // Zeros of encoders are large numbers that squares do not like.
         let of_file = &mut all.rows[begin..];
@@ -289,10 +279,9 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
         of_file.iter_mut().for_each(|row| row.measured_arcsec -= mean);
         all.measured_means_arcsec.push(mean);
     }
-    let kinds = [(FoldKind::Files, files.len() >= ENOUGH_SESSIONS), (FoldKind::Sessions, by_sessions)];
-    let kinds = kinds.into_iter().filter(|(_, enough)| *enough).map(|(kind, _)| (kind, 1));
-    for (kind, rounds) in kinds.chain([(FoldKind::Blocks, 1), (FoldKind::Blocks, ROUNDS)]) {
-        all.fold(kind, rounds, &session_of);
+    let by_file = (files.len() >= ENOUGH_FILES).then_some((FoldKind::Files, 1));
+    for (kind, rounds) in by_file.into_iter().chain([(FoldKind::Blocks, 1), (FoldKind::Blocks, ROUNDS)]) {
+        all.fold(kind, rounds);
         if all.folds_are_within_each_other(&recorded.scales) {
             break;
         }
@@ -301,19 +290,17 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
 }
 
 impl Rows {
-    /// Makes folds: of files, of sessions, or of the blocks that each file is cut into, which go round a number of
-    /// times.
-    fn fold(&mut self, kind: FoldKind, rounds: usize, session_of: &[usize]) {
+    /// Makes folds: of files, or of the blocks that each file is cut into, which go round a number of times.
+    fn fold(&mut self, kind: FoldKind, rounds: usize) {
         self.folds = kind;
         let mut of_file = vec![0; self.measured_means_arcsec.len()];
         self.rows.iter().for_each(|row| of_file[row.at.log] += 1);
         let mut before = vec![0; of_file.len()];
-        for (row, session) in self.rows.iter_mut().zip(session_of) {
+        for row in &mut self.rows {
             let block = before[row.at.log] * BLOCKS * rounds / of_file[row.at.log];
             before[row.at.log] += 1;
             let fold = match kind {
                 FoldKind::Files => row.at.log,
-                FoldKind::Sessions => *session,
                 FoldKind::Blocks => block,
             };
             row.fold = fold % BLOCKS;
@@ -354,8 +341,7 @@ impl Rows {
     /// With blocks of each log for folds: what is a log's own is not seen in the others.
     pub(crate) fn in_blocks(mut self) -> Rows {
         if self.folds != FoldKind::Blocks {
-            let sessions = vec![0; self.rows.len()];
-            self.fold(FoldKind::Blocks, ROUNDS, &sessions);
+            self.fold(FoldKind::Blocks, ROUNDS);
         }
         self
     }
