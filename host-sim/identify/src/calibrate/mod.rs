@@ -724,52 +724,48 @@ impl Fitted {
         let all = folds.all();
         let before = folds.left_out(&all, &[]);
         let with = folds.left_out(&all, &model.chosen);
+        let percent = |share: f64| 100.0 * share;
         let says = |part: PartName| {
-            let refused = |gain: Option<f64>, why: String| PartSays {
-                name: part.as_str(),
-                kept: false,
-                held_out_gain: gain,
-                penalty: None,
-                size_arcsec: None,
-                why,
-            };
-            if let Some(why) = recorded.lacks(part, prior) {
-                return refused(None, why);
-            }
-            if let Some((_, why)) = self.without.iter().find(|(other, _)| *other == part) {
-                return refused(None, (*why).to_owned());
-            }
-            if let Some(chosen) = model.chosen.iter().find(|chosen| chosen.part == part) {
+            let chosen = model.chosen.iter().find(|chosen| chosen.part == part);
+            let refused = recorded.lacks(part, prior).or_else(|| {
+                let without = self.without.iter().find(|(other, _)| *other == part);
+                without.map(|(_, why)| (*why).to_owned())
+            });
+            let (held_out_gain, why) = if let Some(why) = refused {
+                (None, why)
+            } else if chosen.is_some() {
                 let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
                 let without = folds.left_out(&all, &others);
-                return PartSays {
-                    name: part.as_str(),
-                    kept: true,
-                    held_out_gain: Some((without - with) / before),
-                    penalty: Some(chosen.penalty),
-                    size_arcsec: Some(size(rows, model, *chosen)),
-                    why: format!(
-                        "it takes {:.1} % of the squares that the others leave ({:.0} % are asked for); without it the \
+                let why = format!(
+                    "it takes {:.1} % of the squares that the others leave ({:.0} % are asked for); without it the \
                      error where nothing was fitted is {:.2} times as large",
-                        100.0 * (without - with) / without,
-                        100.0 * LEAST_GAIN,
-                        (without / with).sqrt()
-                    ),
-                };
-            }
-            let (_, left) = best_penalty(folds, &all, &model.chosen, Chosen { part, penalty: 0.0 });
-            let gain = (with - left) / before;
-            let share = (with - left) / with;
-            let why = if share > LEAST_GAIN {
-                "it gains in the rows it was chosen on, not where it was not".to_owned()
+                    percent((without - with) / without),
+                    percent(LEAST_GAIN),
+                    (without / with).sqrt()
+                );
+                (Some((without - with) / before), why)
             } else {
-                format!(
-                    "it would take {:.1} % of the squares that the others leave; {:.0} % are asked for",
-                    100.0 * share,
-                    100.0 * LEAST_GAIN
-                )
+                let (_, left) = best_penalty(folds, &all, &model.chosen, Chosen { part, penalty: 0.0 });
+                let share = (with - left) / with;
+                let why = if share > LEAST_GAIN {
+                    "it gains in the rows it was chosen on, not where it was not".to_owned()
+                } else {
+                    format!(
+                        "it would take {:.1} % of the squares that the others leave; {:.0} % are asked for",
+                        percent(share),
+                        percent(LEAST_GAIN)
+                    )
+                };
+                (Some((with - left) / before), why)
             };
-            refused(Some(gain), why)
+            PartSays {
+                name: part.as_str(),
+                kept: chosen.is_some(),
+                held_out_gain,
+                penalty: chosen.map(|chosen| chosen.penalty),
+                size_arcsec: chosen.map(|chosen| size(rows, model, *chosen)),
+                why,
+            }
         };
         PartName::ALL.into_iter().map(says).collect()
     }
