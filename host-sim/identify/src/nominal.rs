@@ -120,7 +120,9 @@ impl Nominal {
     #[must_use]
     pub fn gear(&self) -> Gear {
         let gear = match self.teeth {
-            Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == FixedMember::Flexspline),
+            Some(teeth) => {
+                Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == FixedMember::Flexspline)
+            }
             None => Gear::of_ratio(self.ratio),
         };
         let stiffest = self.stiffness.iter().fold(f64::INFINITY, |_, [_, stiffness]| *stiffness);
@@ -417,8 +419,7 @@ fn ratio_and_teeth(file: &mut TomlFile<'_>, drive: &Section<'_, '_>) -> Option<(
                     ..refused
                 })
             })?;
-            let names =
-                [("flexspline", FixedMember::Flexspline), ("circular_spline", FixedMember::CircularSpline)];
+            let names = [("flexspline", FixedMember::Flexspline), ("circular_spline", FixedMember::CircularSpline)];
             let fixed = match drive.has("fixed") {
                 true => drive.needed(file, "fixed", |v| one_of(&names, v))?,
                 false => FixedMember::Flexspline,

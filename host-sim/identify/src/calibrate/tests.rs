@@ -187,11 +187,7 @@ fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
         calibrate(&[log], &prior).unwrap().calibration
     };
     let c = late(&planned);
-    assert!(
-        c.has_delay() && (c.readings[0].value - 0.005).abs() < OF_95 * c.readings[0].std,
-        "{:?}",
-        c.notes
-    );
+    assert!(c.has_delay() && (c.readings[0].value - 0.005).abs() < OF_95 * c.readings[0].std, "{:?}", c.notes);
     assert!(!kept(&c).contains(&"play") && c.core.rms_after_arcsec < 1.5, "{:?}", c.core);
     // The same passes at one speed.
     let fastest = planned.passes.iter().map(|pass| pass.speed_rpm).fold(0.0, f64::max);

@@ -6,9 +6,9 @@ use std::ops::Range;
 
 pub(crate) use crate::least_squares::{add_scaled, combined};
 pub(crate) use crate::measurement::rms;
-use flexspline::FixedMember;
 use crate::measurement::{Session, neighbours, quantile_of, rates};
 use crate::nominal::Nominal;
+use flexspline::FixedMember;
 pub(super) use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 

@@ -77,8 +77,9 @@ mod tests {
         }
         // With the circular spline fixed it is the flexspline that turns.
         let mut other = nominal.clone();
-        other.teeth =
-            other.teeth.map(|teeth| flexspline_identify::nominal::Teeth { fixed: FixedMember::CircularSpline, ..teeth });
+        other.teeth = other
+            .teeth
+            .map(|teeth| flexspline_identify::nominal::Teeth { fixed: FixedMember::CircularSpline, ..teeth });
         other.ratio = -94.0;
         assert!((along(&ring, Axis::Generator, &other)[0] - 2.0).abs() < 1e-9);
         let runout = along(&cause(CauseName::FlexsplineRunout), Axis::Generator, &other);

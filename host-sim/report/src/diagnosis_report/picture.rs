@@ -157,7 +157,8 @@ impl DiagnosisKnown<'_> {
 
     /// The symbol of an angle, and the parts that turn with it.
     fn angle_name(&self, angle: Angle) -> (&'static str, &'static str) {
-        let flexspline_turns = self.sources.nominal.teeth.is_some_and(|teeth| teeth.fixed == FixedMember::CircularSpline);
+        let flexspline_turns =
+            self.sources.nominal.teeth.is_some_and(|teeth| teeth.fixed == FixedMember::CircularSpline);
         match angle {
             Angle::Generator if flexspline_turns => ("ψ", "generator and circular spline"),
             Angle::Generator => ("ψ", "generator and flexspline"),

@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 
 use std::f64::consts::PI;
 
-use flexspline::FixedMember;
 use crate::nominal::Nominal;
+use flexspline::FixedMember;
 
 use super::displaced::displaced;
 use super::{
