@@ -358,11 +358,6 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let _ = writeln!(text, "{}", held(c));
-    let _ = writeln!(
-        text,
-        "a generator degree in its zero costs {:.2} arcsec rms",
-        c.zero_cost.rms_arcsec_per_generator_deg
-    );
     let mut files = vec!["calibrated.fxt", "calibrated.h", "calibrated.rs", "calibration.json"];
     files.extend(with_page.then_some("report.html (for any browser)"));
     text + &format!("wrote to {}/: {}", out.display(), files.join(", "))

@@ -45,7 +45,7 @@ pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
 
 use together::Agreement;
-pub(crate) use zero::{Alignment, OutputZero, ZeroCost, cost};
+pub(crate) use zero::{Alignment, OutputZero};
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -324,8 +324,6 @@ pub struct Calibration {
     pub alignment: Option<Alignment>,
     /// Zero of the output in each file. Generator angle zero of the table is where the logs read zero.
     pub output_zeros: Vec<OutputZero>,
-    /// Cost of an error in the zeros of the table.
-    pub zero_cost: ZeroCost,
     /// Generator turns for one of the output.
     pub ratio: f64,
     /// Identity of the table.
@@ -619,7 +617,6 @@ fn report(
         half_width_at_another_pace_arcsec,
         alignment,
         output_zeros,
-        zero_cost: cost(&image),
         ratio: prior.nominal.ratio,
         table_id: made.info.table_id.clone(),
         image_bytes: made.image.len(),

@@ -603,8 +603,6 @@ fn the_phase_of_a_table_is_found_from_a_log() {
     assert!(again.calibration.core.rms_after_arcsec < 2.6, "{:?}", again.calibration.core);
     // Noise alone tells no phase.
     let flat = recording(3, |_, _, torque, _| 1.5 * torque);
-    let cost = again.calibration.zero_cost;
-    assert!(cost.rms_arcsec_per_generator_deg > 0.4 && cost.most_arcsec_per_generator_deg < 2.0, "{cost:?}");
     let only_load = calibrate(std::slice::from_ref(&flat), &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
     let smooth = Table::check(&only_load.table.image).unwrap();
     let told = zero::align(

@@ -56,18 +56,6 @@ pub struct Alignment {
     pub why: String,
 }
 
-/// Cost of an error in the zeros of a table.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ZeroCost {
-    /// For a degree of the generator, arcsec rms and at most: the slope of the error. The nominal output angle moves by
-    /// 3600/ratio arcsec besides, which an output zero that is found afterwards takes up.
-    pub rms_arcsec_per_generator_deg: f64,
-    /// See above.
-    pub most_arcsec_per_generator_deg: f64,
-    /// For a degree of the output, in whole generator turns, arcsec rms.
-    pub rms_arcsec_per_output_deg: f64,
-}
-
 /// Zero of the output of a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutputZero {
@@ -87,57 +75,23 @@ pub(super) fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
     error.map_or(0.0, |rad| f64::from(rad) * ARCSEC_PER_RAD)
 }
 
-/// A state of the table under a load, in the middle of its temperatures.
-fn loaded(table: &Table<'_>, share: f32) -> State {
-    let [low, high] = table.temperature_range_c();
-    let [least, most] = table.torque_range_n_m();
-    let torque = if most.abs() >= least.abs() { most } else { least };
-    State {
-        torque_n_m: f64::from(share * torque),
-        temperature_c: f64::from(f32::midpoint(low, high)),
-        way: 1.0,
-        ..State::default()
-    }
-}
-
-/// Cost of an error in the zeros, at half the largest load.
-#[must_use]
-pub fn cost(table: &Table<'_>) -> ZeroCost {
-    const STEP_DEG: f64 = 0.02;
-    const PLACES: usize = 4001;
-    let ratio = table.drive().exact_ratio();
-    let slope = |angle: f64, by: f64| {
-        let at = |psi: f64| steady(table, &State { generator_rad: psi, ..loaded(table, 0.5) }, 0.0);
-        at(angle + by) - at(angle - by)
-    };
-    let (mut squares, mut most, mut by_output) = (0.0, 0.0_f64, 0.0);
-    // A turn of the output either side is alike.
-    for k in 0..PLACES {
-        let angle = TAU * ratio.abs() * (k as f64 * GOLDEN).fract();
-        let by_degree = slope(angle, STEP_DEG.to_radians()) / (2.0 * STEP_DEG);
-        squares += by_degree * by_degree;
-        most = most.max(by_degree.abs());
-        // Turns either way.
-        let turns = (ratio.abs() / 360.0).ceil();
-        by_output += (slope(angle, TAU * turns) / (2.0 * turns * 360.0 / ratio.abs())).powi(2);
-    }
-    let rms = |squares: f64| (squares / PLACES as f64).sqrt();
-    ZeroCost {
-        rms_arcsec_per_generator_deg: rms(squares),
-        most_arcsec_per_generator_deg: most,
-        rms_arcsec_per_output_deg: rms(by_output),
-    }
-}
-
-/// After which angle of the generator a table repeats, rad.
+/// Generator angle after which a table repeats, at half its largest load, rad.
 fn repeats(table: &Table<'_>) -> f64 {
     let drive = table.drive();
     let ratio = drive.exact_ratio().abs();
     let pitch = TAU / f64::from(drive.ripple_order());
+    let ([low, high], [least, most]) = (table.temperature_range_c(), table.torque_range_n_m());
+    let half_n_m = 0.5 * if most.abs() >= least.abs() { most } else { least };
+    let loaded = State {
+        torque_n_m: f64::from(half_n_m),
+        temperature_c: f64::from(f32::midpoint(low, high)),
+        way: 1.0,
+        ..State::default()
+    };
     let differs = |by: f64| {
         (0..400)
             .map(|k| {
-                let at = State { generator_rad: TAU * ratio * (f64::from(k) * GOLDEN).fract(), ..loaded(table, 0.5) };
+                let at = State { generator_rad: TAU * ratio * (f64::from(k) * GOLDEN).fract(), ..loaded };
                 let turned = State { generator_rad: at.generator_rad + by, ..at };
                 (steady(table, &turned, 0.0) - steady(table, &at, 0.0)).abs()
             })
