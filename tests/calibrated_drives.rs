@@ -463,7 +463,7 @@ fn of_drive(seed: u64) -> Figures {
     let table = Table::check(&nominal).unwrap();
     let prior = Prior::of_table(&table, GeneratorKind::Cam);
     let bench = Bench { rate_hz: RATE_HZ, torque_n_m: LOADS_N_M, temperature_c: TEMPERATURES_C, ..Bench::default() };
-    let planned = plan(&prior, &bench, None).unwrap();
+    let planned = plan(&prior, &bench).unwrap();
     let runs: Vec<Run> = (1..=3).map(|log| planned_run(&planned, log).drive(&unit)).collect();
     let logs: Vec<Recording> = runs
         .iter()

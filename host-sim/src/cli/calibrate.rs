@@ -28,10 +28,8 @@ use flexspline_report::calibration_report;
 /// calibration.json and report.html.
 ///
 /// --plan reports what to record before there is a log: the most informative passes of the bench in the time available,
-/// with the accuracy to expect. --more reports what to record in addition to the logs. Both write plan.csv and
-/// plan.json.
+/// with the accuracy to expect. It writes plan.csv and plan.json.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("planned").args(["plan", "more"]))]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\
 Examples:
@@ -46,9 +44,6 @@ pub(super) struct Calibrate {
     /// Report what to record on a bench, instead of reading logs
     #[arg(long, conflicts_with = "logs")]
     plan: bool,
-    /// Also report what to record next, after these logs
-    #[arg(long)]
-    more: bool,
     /// Folder of tables made by `flexspline tables`; the one of --generator is the starting point
     #[arg(long, value_name = "DIR")]
     tables: Option<PathBuf>,
@@ -70,34 +65,34 @@ pub(super) struct Calibrate {
     no_report: bool,
 }
 
-/// Abilities of the bench, for --plan and --more.
+/// Abilities of the bench, for --plan.
 #[derive(Debug, Args)]
 struct BenchOptions {
-    /// Time on the bench for --plan or --more, minutes [default: 60, with --more 10]
-    #[arg(long, value_name = "MIN", requires = "planned")]
+    /// Time on the bench for --plan, minutes [default: 60]
+    #[arg(long, value_name = "MIN", requires = "plan")]
     minutes: Option<f64>,
-    /// Largest generator speed for --plan or --more, rpm [default: 60]
-    #[arg(long, value_name = "RPM", requires = "planned")]
+    /// Largest generator speed for --plan, rpm [default: 60]
+    #[arg(long, value_name = "RPM", requires = "plan")]
     speed_rpm: Option<f64>,
-    /// Least and largest load at the output for --plan or --more, N.m [default: none]
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, requires = "planned")]
+    /// Least and largest load at the output for --plan, N.m [default: none]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, requires = "plan")]
     load_n_m: Vec<f64>,
-    /// Lowest and highest temperature for --plan or --more, degrees C [default: one, 20]
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, requires = "planned")]
+    /// Lowest and highest temperature for --plan, degrees C [default: one, 20]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, requires = "plan")]
     temperatures_c: Vec<f64>,
-    /// Travel of the output for --plan or --more, deg [default: a turn, 0,360]
-    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', allow_hyphen_values = true, requires = "planned")]
+    /// Travel of the output for --plan, deg [default: a turn, 0,360]
+    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', allow_hyphen_values = true, requires = "plan")]
     travel_deg: Vec<f64>,
     /// White noise of the error (output minus generator over ratio) that --plan assumes, arcsec [default: 1]
-    #[arg(long, value_name = "ARCSEC", requires = "planned")]
+    #[arg(long, value_name = "ARCSEC", requires = "plan")]
     noise_arcsec: Option<f64>,
     /// Drift of the sensors within a minute that --plan assumes, arcsec [default: 0.5]
-    #[arg(long, value_name = "ARCSEC", requires = "planned")]
+    #[arg(long, value_name = "ARCSEC", requires = "plan")]
     wander_arcsec: Option<f64>,
 }
 
 impl BenchOptions {
-    fn bench(&self, minutes: f64, rate_hz: Option<f64>, temperature_c: f64) -> Result<Bench, Failure> {
+    fn bench(&self, rate_hz: Option<f64>, temperature_c: f64) -> Result<Bench, Failure> {
         let usual = Bench::default();
         let pair = |name: &str, values: &[f64], usual: [f64; 2]| match values {
             [] => Ok(usual),
@@ -106,7 +101,7 @@ impl BenchOptions {
             more => Err(Failure::BadInput(format!("{name}: found {} numbers, allowed: one or two", more.len()))),
         };
         let bench = Bench {
-            minutes: self.minutes.unwrap_or(minutes),
+            minutes: self.minutes.unwrap_or(usual.minutes),
             rate_hz: rate_hz.unwrap_or(usual.rate_hz),
             speed_rpm: self.speed_rpm.unwrap_or(usual.speed_rpm),
             torque_n_m: pair("--load-n-m", &self.load_n_m, usual.torque_n_m)?,
@@ -122,8 +117,6 @@ impl BenchOptions {
 
 /// First column of plan.csv.
 const PLAN_BEGINS: &str = "log";
-/// Minutes on the bench where nobody says how many: for the first log, and for what is added.
-const MINUTES: [f64; 2] = [60.0, 10.0];
 
 impl Calibrate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
@@ -146,14 +139,13 @@ impl Calibrate {
         let known = subject.map_or(Ok(None), |subject| subject.known_before(&mut files)).map_err(bad_input)?;
         let known = known.as_ref().map(|made| table_of(Path::new("drive-extended"), &made.image)).transpose()?;
         let prior = known.as_ref().map_or(prior, |known| Prior::of_table(known, self.generator));
-        let out = if self.more { context.out_for_plan(PLAN_BEGINS)? } else { context.out()? };
+        let out = context.out()?;
         if !self.no_report {
             report::before(context, out, "calibrate", None);
         }
         let mut made = calibrate(&files, &prior).map_err(|error| self.failed(&error))?;
         made.calibration.command.clone_from(&context.command);
         made.table.info.command.clone_from(&context.command);
-        let further = self.more.then(|| self.planned(context, &prior, Some(&made))).transpose()?;
         let mut outputs = Outputs::new();
         let mut put = |name: &str, content: &[u8]| outputs.file(&out.join(name), |file| file.write_all(content));
         put("calibrated.fxt", &made.table.image)?;
@@ -163,37 +155,21 @@ impl Calibrate {
         if !self.no_report {
             report::write(&calibration_report::page(&made), out, &mut outputs)?;
         }
-        if let Some(further) = &further {
-            put_plan(further, out, &mut outputs)?;
-        }
         outputs.finish()?;
-        let said = CalibrationReport { calibration: &made.calibration, more: further.as_ref() };
-        context.print(&said, || {
-            let more = further.as_ref().map_or_else(String::new, |further| format!("\n{}", planned_text(further, out)));
-            text(&made, out, !self.no_report) + &more + &say::next(&self.next(out))
-        })
+        context.print(&made.calibration, || text(&made, out, !self.no_report) + &say::next(&self.next(out)))
     }
 
     /// Says what to record.
     fn write_plan(&self, context: &Context, prior: &Prior<'_>) -> Result<(), Failure> {
-        let planned = self.planned(context, prior, None)?;
+        let bench = self.bench.bench(self.columns.rate_hz(), prior.nominal.temperature_c)?;
+        let mut planned = plan(prior, &bench).map_err(bad_input)?;
+        planned.command.clone_from(&context.command);
         let out = context.out_for_plan(PLAN_BEGINS)?;
         let mut outputs = Outputs::new();
-        put_plan(&planned, out, &mut outputs)?;
+        outputs.csv(&out.join("plan.csv"), &planned.passes)?;
+        outputs.json(&out.join("plan.json"), &planned)?;
         outputs.finish()?;
         context.print(&planned, || planned_text(&planned, out))
-    }
-
-    /// Plan of the first log, or of further ones than those that made a table.
-    fn planned(&self, context: &Context, prior: &Prior<'_>, made: Option<&Calibrated>) -> Result<Planned, Failure> {
-        let (minutes, temperature_c) = made.map_or((MINUTES[0], prior.nominal.temperature_c), |made| {
-            let [low, high] = made.calibration.temperature_c.map(f64::from);
-            (MINUTES[1], f64::midpoint(low, high))
-        });
-        let bench = self.bench.bench(minutes, self.columns.rate_hz(), temperature_c)?;
-        let mut planned = plan(prior, &bench, made).map_err(bad_input)?;
-        planned.command.clone_from(&context.command);
-        Ok(planned)
     }
 
     /// The failure, with the files where the error does not name one.
@@ -220,21 +196,6 @@ impl Calibrate {
         let table = quoted(&out.join("calibrated.fxt").display().to_string());
         vec![format!("flexspline replay --tables {table} ANOTHER.log")]
     }
-}
-
-/// Report that `--json` prints: the calibration, and the plan of further logs.
-#[derive(serde::Serialize)]
-struct CalibrationReport<'a> {
-    #[serde(flatten)]
-    calibration: &'a Calibration,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    more: Option<&'a Planned>,
-}
-
-fn put_plan(planned: &Planned, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
-    outputs.csv(&out.join("plan.csv"), &planned.passes)?;
-    outputs.json(&out.join("plan.json"), planned)?;
-    Ok(())
 }
 
 /// A plan for a reader.
@@ -269,12 +230,6 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
     }
     for why in &planned.cannot {
         let _ = writeln!(text, "not told by these: {why}");
-    }
-    if let Some(before) = planned.rms_before_arcsec {
-        let _ = writeln!(
-            text,
-            "error of the parts over all that the table is to hold, arcsec rms: {before:.2} after these logs"
-        );
     }
     let _ = writeln!(
         text,

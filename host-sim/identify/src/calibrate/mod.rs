@@ -360,8 +360,6 @@ pub struct Calibrated {
     pub table: MadeTable,
     /// How well it is known.
     pub known: ModelUncertainty,
-    rows: Rows,
-    recorded: Recorded,
     /// Rows for a picture: output angle (rad), measured and left by the model (arcsec).
     pub shown: Vec<[f64; 3]>,
 }
@@ -627,7 +625,7 @@ fn report(
         notes,
         command: String::new(),
     };
-    Ok(Calibrated { calibration, table: made, known, rows, recorded: recorded.clone(), shown })
+    Ok(Calibrated { calibration, table: made, known, shown })
 }
 
 /// What keeps a table from being made, with what was noticed of the units and signs of the logs: before what it may be

@@ -4,7 +4,7 @@
 //! Passes that a bench can make (over the whole travel there and back at one load; a few slow generator turns) are
 //! added one after the other, each time the one that lowers the expected variance of the table, over all that it is to
 //! hold, most for its time. The expected accuracy is that of the information matrix of all of them, for the noise that
-//! is assumed or that a first log has shown.
+//! is assumed.
 
 use std::f64::consts::TAU;
 
@@ -13,9 +13,7 @@ use serde::Serialize;
 use super::interval::{Node, RowNoise, planned_covariance, row_of_group, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, Recorded, late_s};
-use super::{
-    Calibrated, CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH,
-};
+use super::{CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH};
 use crate::linear::Gram;
 use crate::measurement::least_and_most;
 
@@ -46,8 +44,6 @@ const SPEEDS: usize = 101;
 const PLACES_OF_A_TURN: u32 = 24;
 /// Passes of a plan that nobody would drive by hand. *Guess*.
 const MOST_PASSES: usize = 5000;
-/// An error beyond this, arcsec rms, is that of a part that was not recorded at all. *Guess*.
-const NOT_RECORDED_ARCSEC: f64 = 1e3;
 
 /// Limits of the bench, and the range that the table is to hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -180,9 +176,6 @@ pub struct Planned {
     pub minutes: f64,
     /// Expected error of the table's parts over all that it is to hold, arcsec rms: of sensors' noise alone.
     pub expected_rms_arcsec: f64,
-    /// The same of the first log alone; absent where there is none, or where it has not recorded some part at all.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_before_arcsec: Option<f64>,
     /// Half widths expected at the nodes.
     pub nodes: Vec<Node>,
     /// Parts that this bench cannot tell, and why.
@@ -191,21 +184,20 @@ pub struct Planned {
     pub command: String,
 }
 
-/// Plans what to record of a drive, after a first log if there is one.
+/// Plans what to record of a drive.
 ///
 /// # Errors
 /// A bench with numbers out of range, or with no time for a single pass.
-pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Result<Planned, CalibrationError> {
+pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationError> {
     prior.core_drive()?;
     if let Some(problem) = bench.problem() {
         return Err(CalibrationError::Known(problem));
     }
-    let wide = |[a, b]: [f64; 2], other: Option<[f64; 2]>| other.map_or([a, b], |[c, d]| [a.min(c), b.max(d)]);
-    let torque = wide(bench.torque_n_m, first.map(|first| first.recorded.scales.torque_n_m));
+    let [low, high] = bench.torque_n_m;
     let scales = Scales {
-        torque_n_m: torque,
-        friction_n_m: prior.friction_n_m().max(LEAST_FRICTION * torque[0].abs().max(torque[1].abs())),
-        temperature_c: wide(bench.temperature_c, first.map(|first| first.recorded.scales.temperature_c)),
+        torque_n_m: bench.torque_n_m,
+        friction_n_m: prior.friction_n_m().max(LEAST_FRICTION * low.abs().max(high.abs())),
+        temperature_c: bench.temperature_c,
         teeth: prior.tooth_pitches(),
         speed_rad_s: bench.speed_rpm / 60.0 * TAU / prior.nominal.ratio.abs(),
         late_s: late_s(1.0 / bench.rate_hz),
@@ -215,18 +207,12 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let recorded = recordable(prior, bench, scales);
     let mut chosen = recorded.shown(PartName::ALL, prior);
     let mut cannot: Vec<String> = PartName::ALL.iter().filter_map(|part| lacks(*part, &recorded, prior)).collect();
-    let warmths = temperatures(bench).len();
-    let files = first.map_or(0, |first| first.calibration.files.len());
-    chosen.extend((0..warmths + files).map(PartName::ReadingDelay));
+    let logs = temperatures(bench).len();
+    chosen.extend((0..logs).map(PartName::ReadingDelay));
     let candidates = candidates(prior, bench, &scales, &chosen);
-    let noise = first.map_or_else(|| bench.noise(), |first| first.known.noise);
+    let noise = bench.noise();
 
-    let width = width_of(&chosen);
-    let mut known = vec![Gram::none(width + 2); warmths + files];
-    for at in first.iter().flat_map(|first| &first.rows.rows) {
-        let at_log = State { log: warmths + at.at.log, ..at.at };
-        known[warmths + at.at.log].add_row(&row_of_group(&chosen, &at_log, &scales, 0.0), 1.0);
-    }
+    let mut known = vec![Gram::none(width_of(&chosen) + 2); logs];
     let travel = bench.output_deg.map(f64::to_radians);
     let asked = Asked::of(&scales, ratio, travel, &chosen);
     let of = |known: &[Gram]| {
@@ -235,7 +221,6 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     };
 
     let mut now = of(&known)?;
-    let rms_at_first = asked.mean_variance(&now).sqrt();
     let (mut left_s, mut taken) = (60.0 * bench.minutes, Vec::new());
     while taken.len() < MOST_PASSES {
         let uncertain = asked.mean_variance(&now);
@@ -285,7 +270,6 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let passes = in_order(taken);
     if chosen.contains(&PartName::WindUp) {
         let mut loads: Vec<f64> = passes.iter().map(|pass| pass.torque_n_m).collect();
-        loads.extend(first.iter().flat_map(|first| first.recorded.scales.torque_n_m));
         loads.sort_by(f64::total_cmp);
         loads.dedup();
         let wind_up = nodes.iter().filter(|node| node.part == PartName::WindUp.as_str());
@@ -312,7 +296,6 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         minutes: passes.iter().map(|pass| pass.duration_s).sum::<f64>() / 60.0,
         passes,
         expected_rms_arcsec: asked.mean_variance(&now).sqrt(),
-        rms_before_arcsec: first.map(|_| rms_at_first).filter(|rms| *rms < NOT_RECORDED_ARCSEC),
         nodes,
         cannot,
         command: String::new(),

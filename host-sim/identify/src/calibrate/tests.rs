@@ -177,7 +177,7 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
 fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
     let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
     let bench = Bench { minutes: 40.0, rate_hz: 5.0, torque_n_m: [-30.0, 30.0], ..Bench::default() };
-    let planned = plan(&prior, &bench, None).unwrap();
+    let planned = plan(&prior, &bench).unwrap();
     let law = |psi: f64, out: f64, torque: f64, _: f64| 18.0 * (2.0 * psi).sin() + 40.0 * out.cos() + 1.2 * torque;
     let late = |planned: &Planned| {
         let mut log = played(planned, 4, law);
@@ -206,7 +206,7 @@ fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
     let widths = [c.half_width_as_recorded_arcsec, c.half_width_at_another_pace_arcsec];
     assert!(widths[0] < said && widths[1] > 2.5 * said, "{widths:?}, {said} of a millisecond");
     // A plan that has time for one pace says so.
-    let short = plan(&prior, &Bench { minutes: 8.0, ..bench }, None).unwrap();
+    let short = plan(&prior, &Bench { minutes: 8.0, ..bench }).unwrap();
     assert!(short.cannot.iter().any(|why| why.starts_with("reading_delay")), "{:?}", short.cannot);
 }
 
@@ -469,13 +469,14 @@ fn a_plan_says_what_noise_leaves_and_its_intervals_hold() {
     let bench =
         Bench { minutes: 40.0, rate_hz: 5.0, torque_n_m: [-30.0, 30.0], wander_arcsec: 0.0, ..Bench::default() };
     let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
-    let planned = plan(&prior, &bench, None).unwrap();
+    let planned = plan(&prior, &bench).unwrap();
     assert!(planned.minutes <= 40.0 && planned.passes.len() >= 8, "{} passes", planned.passes.len());
     assert!(planned.passes.iter().any(|pass| pass.torque_n_m == 0.0), "no pass without load");
     let (mut squares, mut expected, mut inside, mut count) = (0.0, 0.0, 0.0, 0.0);
     for seed in 0..6 {
-        let made = calibrate(&[played(&planned, seed, law)], &prior).unwrap();
-        let states = interval::spread(&made.recorded.scales, RATIO, [0.0, std::f64::consts::TAU], 2000);
+        let log = [played(&planned, seed, law)];
+        let made = calibrate(&log, &prior).unwrap();
+        let states = interval::spread(&Recorded::of(&log, &prior).scales, RATIO, [0.0, std::f64::consts::TAU], 2000);
         let states: Vec<State> = states.into_iter().filter(|at| at.torque_n_m.abs() > 1.0).collect();
         let model = Prior::of_ratio(RATIO, GeneratorKind::Cam);
         let table = Table::check(&made.table.image).unwrap();
@@ -508,7 +509,7 @@ fn a_plan_says_what_noise_leaves_and_its_intervals_hold() {
 fn few_loads_leave_their_doubt_in_the_interval() {
     let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
     let bench = Bench { minutes: 14.0, rate_hz: 5.0, torque_n_m: [-30.0, 30.0], ..Bench::default() };
-    let planned = plan(&prior, &bench, None).unwrap();
+    let planned = plan(&prior, &bench).unwrap();
     let mut first: Vec<f64> = planned.passes[..2].iter().map(|pass| pass.torque_n_m).collect();
     first.sort_by(f64::total_cmp);
     assert_eq!(first, [-30.0, 30.0]);
@@ -528,26 +529,6 @@ fn few_loads_leave_their_doubt_in_the_interval() {
         let (inside, all) = (nodes.clone().filter(holds).count(), nodes.clone().count());
         assert!(inside == all, "bend {bend}: {inside} of {all}: {:?}", nodes.collect::<Vec<_>>());
     }
-}
-
-/// A first log at one load says nothing of the wind-up: the plan for more says so, and asks for other loads.
-#[test]
-fn what_a_first_log_lacks_is_asked_for_next() {
-    let law = |psi: f64, out: f64, torque: f64, _: f64| 18.0 * (2.0 * psi).sin() + 40.0 * out.cos() + 1.2 * torque;
-    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
-    let bench = Bench { minutes: 12.0, rate_hz: 5.0, torque_n_m: [10.0, 10.0], ..Bench::default() };
-    let first = plan(&prior, &bench, None).unwrap();
-    assert!(first.cannot.iter().any(|why| why.starts_with("wind_up")), "{:?}", first.cannot);
-    let made = calibrate(&[played(&first, 1, law)], &prior).unwrap();
-    let further = plan(&prior, &Bench { torque_n_m: [-30.0, 30.0], ..bench }, Some(&made)).unwrap();
-    assert!(further.passes.iter().all(|pass| (pass.torque_n_m - 10.0).abs() > 1.0), "{:?}", further.passes);
-    // The wind-up at the ends of the loads, which the first log leaves as open as that of any drive.
-    let widest = |planned: &Planned| {
-        let wind_up = planned.nodes.iter().filter(|node| node.part == "wind_up");
-        wind_up.map(|node| node.half_width_arcsec).fold(0.0, f64::max)
-    };
-    assert!(widest(&further) > 0.0 && widest(&further) < 30.0, "{:?}", further.nodes);
-    assert!(further.rms_before_arcsec.is_none_or(|before| further.expected_rms_arcsec < 0.5 * before), "{further:?}");
 }
 
 #[test]
@@ -605,11 +586,9 @@ fn the_phase_of_a_table_is_found_from_a_log() {
     let flat = recording(3, |_, _, torque, _| 1.5 * torque);
     let only_load = calibrate(std::slice::from_ref(&flat), &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
     let smooth = Table::check(&only_load.table.image).unwrap();
-    let told = zero::align(
-        &smooth,
-        &settled(&[flat], &Prior::of_table(&smooth, GeneratorKind::Cam), &only_load.recorded),
-        0.6,
-    );
+    let by_ratio = Recorded::of(std::slice::from_ref(&flat), &Prior::of_ratio(RATIO, GeneratorKind::Cam));
+    let rows = settled(&[flat], &Prior::of_table(&smooth, GeneratorKind::Cam), &by_ratio);
+    let told = zero::align(&smooth, &rows, 0.6);
     assert!(!told.told, "{told:?}");
 }
 
