@@ -33,7 +33,6 @@ pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
-use interval::OF_95;
 pub use interval::{ModelUncertainty, Node, RowNoise};
 use parts::usual_arcsec;
 pub use parts::{PartName, Scales, State};
@@ -45,7 +44,7 @@ pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
 
 use together::Agreement;
-pub(crate) use zero::{Alignment, OutputZero};
+pub(crate) use zero::Alignment;
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -304,7 +303,7 @@ pub struct Calibration {
     /// the two apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub play_of_a_millisecond_arcsec: Option<f64>,
-    /// All that belongs to the reading.
+    /// All that belongs to the reading. Generator angle zero of the table is where the logs read zero.
     pub readings: Vec<Reading>,
     /// The parts.
     pub parts: Vec<PartSays>,
@@ -322,8 +321,6 @@ pub struct Calibration {
     /// Phase of the table that was known before, if one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<Alignment>,
-    /// Zero of the output in each file. Generator angle zero of the table is where the logs read zero.
-    pub output_zeros: Vec<OutputZero>,
     /// Generator turns for one of the output.
     pub ratio: f64,
     /// Identity of the table.
@@ -584,14 +581,7 @@ fn report(
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
-    let output_zeros = output_zeros(files, &rows, &model, known.noise);
-    let offset = |zero: &OutputZero| Reading {
-        name: "offset",
-        file: Some(zero.file.clone()),
-        value: zero.arcsec,
-        std: zero.half_width_arcsec / OF_95,
-    };
-    readings.extend(output_zeros.iter().map(offset));
+    readings.extend(offsets(files, &rows, &model, known.noise));
     let calibration = Calibration {
         schema_version: 1,
         files: files.iter().map(|file| file.file.clone()).collect(),
@@ -614,7 +604,6 @@ fn report(
         half_width_as_recorded_arcsec,
         half_width_at_another_pace_arcsec,
         alignment,
-        output_zeros,
         ratio: prior.nominal.ratio,
         table_id: made.info.table_id.clone(),
         image_bytes: made.image.len(),
@@ -649,18 +638,19 @@ fn with_faults(error: CalibrationError, files: &[Recording], said: &[String]) ->
 }
 
 /// The zero of the output in each file.
-fn output_zeros(files: &[Recording], rows: &Rows, model: &Model, noise: RowNoise) -> Vec<OutputZero> {
+fn offsets(files: &[Recording], rows: &Rows, model: &Model, noise: RowNoise) -> Vec<Reading> {
     let mut sums = vec![(0.0, 0.0); files.len()];
     for row in &rows.rows {
         sums[row.at.log].0 += row.left_arcsec - model.adds_arcsec(&row.at);
         sums[row.at.log].1 += 1.0;
     }
-    let zero = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| OutputZero {
-        file: file.file.clone(),
-        arcsec: mean + sum / f64::max(count, 1.0),
-        half_width_arcsec: interval::OF_95 * (noise.of_a_row() / f64::max(count, 1.0)).sqrt(),
+    let offset = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| Reading {
+        name: "offset",
+        file: Some(file.file.clone()),
+        value: mean + sum / f64::max(count, 1.0),
+        std: (noise.of_a_row() / f64::max(count, 1.0)).sqrt(),
     };
-    files.iter().zip(sums).zip(&rows.means_arcsec).map(zero).collect()
+    files.iter().zip(sums).zip(&rows.means_arcsec).map(offset).collect()
 }
 
 /// A part that is not fitted, and why.

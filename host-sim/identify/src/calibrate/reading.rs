@@ -23,7 +23,8 @@ pub(super) const DELAY: &str = "delay";
 /// A number of the reading, fitted with the parts of the table and not held by it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
-    /// `delay` (s, positive where the output of a row is older than its generator) or `offset` (arcsec, of the output).
+    /// `delay` (s, positive where the output of a row is older than its generator) or `offset` (arcsec, output less
+    /// generator over ratio less the table's error, mean over the file).
     pub name: &'static str,
     /// The log.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -3,6 +3,7 @@
 use flexspline::Table;
 
 use super::folds::Row;
+use super::interval::OF_95;
 use super::*;
 use crate::extension::left_by_core;
 use crate::measurement::Session;

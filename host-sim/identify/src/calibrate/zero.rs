@@ -56,17 +56,6 @@ pub struct Alignment {
     pub why: String,
 }
 
-/// Zero of the output of a file.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OutputZero {
-    /// Which file.
-    pub file: String,
-    /// Output less generator over ratio less the table's error, arcsec, mean over the file.
-    pub arcsec: f64,
-    /// Half width of the interval that holds it with 95 %, arcsec.
-    pub half_width_arcsec: f64,
-}
-
 /// Error of the table in steady motion, arcsec.
 pub(super) fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
     let direction = if at.way < 0.0 { Direction::Backward } else { Direction::Forward };
