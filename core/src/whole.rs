@@ -202,7 +202,14 @@ const fn shorter(s: u64) -> u64 {
 
 /// `s·2³²` modulo the prime: a step back.
 const fn longer(s: u64) -> u64 {
-    (s / WIDE_FACTOR) | (s % WIDE_FACTOR) << 32
+    // Division by f = 2³² − d without a call of 900 bytes: h·2³² + l = h·f + (h·d + l), and once more for the sum in
+    // brackets, which leaves a rest below 2f.
+    const SHORT: u64 = (1u64 << 32).wrapping_sub(WIDE_FACTOR);
+    let rest = (s >> 32).wrapping_mul(SHORT).wrapping_add(s as u32 as u64);
+    let quotient = (s >> 32).wrapping_add(rest >> 32);
+    let rest = (rest >> 32).wrapping_mul(SHORT).wrapping_add(rest as u32 as u64);
+    let over = (rest >= WIDE_FACTOR) as u64;
+    quotient.wrapping_add(over) | rest.wrapping_sub(over.wrapping_mul(WIDE_FACTOR)) << 32
 }
 
 const fn reduced(s: u64) -> u64 {
@@ -288,29 +295,46 @@ impl<T: Words> Sealed<T> {
     #[cold]
     #[inline(never)]
     fn mended(&self) -> Option<T> {
-        let [low, high] = self.sums;
-        let (wanted, found) = (low as u64 | (high as u64) << 32, Self::found(&self.kept));
-        if is_burst(wanted ^ found) {
-            return Some(self.kept);
-        }
-        let mut kept = self.kept;
-        let (one, other) = (reduced(wanted), reduced(found));
-        let mut missing =
-            if one >= other { one.wrapping_sub(other) } else { PRIME.wrapping_sub(other.wrapping_sub(one)) };
-        // What the first word has to change by: it went through a step for each word, and the last.
-        kept.each(&mut |word| {
-            missing = longer(missing);
-            word
-        });
-        kept.each(&mut |word| {
-            let less = PRIME.wrapping_sub(missing);
-            let better = if missing >> 32 == 0 { word.checked_add(missing as u32) } else { None };
-            let better = if less >> 32 == 0 { word.checked_sub(less as u32) } else { better };
-            missing = shorter(missing);
-            better.filter(|better| is_burst((better ^ word) as u64)).unwrap_or(word)
-        });
-        (Self::found(&kept) == wanted).then_some(kept)
+        let ([low, high], mut kept) = (self.sums, self.kept);
+        let wanted = low as u64 | (high as u64) << 32;
+        mend(wanted, Self::found(&self.kept), &mut |see| kept.each(see)).then_some(kept)
     }
+}
+
+/// Is shown a word, and says what is to stand in its place.
+type Change<'c> = &'c mut dyn FnMut(u32) -> u32;
+
+/// Restores the word of which neighbouring bits changed, if the sum is `found` and was `wanted`; false if no such
+/// change explains it. `each` visits the words. One function for all types: it divides, and is rarely called.
+#[inline(never)]
+fn mend(wanted: u64, found: u64, each: &mut dyn FnMut(Change<'_>)) -> bool {
+    if is_burst(wanted ^ found) {
+        return true;
+    }
+    let (one, other) = (reduced(wanted), reduced(found));
+    let mut missing = if one >= other { one.wrapping_sub(other) } else { PRIME.wrapping_sub(other.wrapping_sub(one)) };
+    // What the first word has to change by: it went through a step for each word, and the last.
+    each(&mut |word| {
+        missing = longer(missing);
+        word
+    });
+    let mut sum = START;
+    each(&mut |word| {
+        let word = restored(word, missing);
+        missing = shorter(missing);
+        sum = add(sum, word);
+        word
+    });
+    add(sum, 0) == wanted
+}
+
+/// A word changed by what the sum misses, if that is a change of neighbouring bits; else as it is.
+#[inline(never)]
+fn restored(word: u32, missing: u64) -> u32 {
+    let less = PRIME.wrapping_sub(missing);
+    let better = if missing >> 32 == 0 { word.checked_add(missing as u32) } else { None };
+    let better = if less >> 32 == 0 { word.checked_sub(less as u32) } else { better };
+    better.filter(|better| is_burst((better ^ word) as u64)).unwrap_or(word)
 }
 
 #[cfg(any(test, feature = "testing"))]
@@ -395,8 +419,11 @@ mod tests {
         assert_eq!(pair(sum_of(&words)), of(&words));
         assert_eq!(Sealed::new(words), Sealed::of(words, sum_of(&words)));
         assert_eq!(Sealed::<[u32; 0]>::new([]), Sealed::of([], sum_of(&[])));
-        for s in [0, 1, 0xffff_ffff, 1 << 32, PRIME - 1, 0x1234_5678_9abc_def0] {
+        let ends = [0, 1, WIDE_FACTOR - 1, WIDE_FACTOR, 0xffff_ffff, 1 << 32, PRIME - 1, 0x1234_5678_9abc_def0];
+        let spread = (0..10_000u64).map(|i| reduced(i.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+        for s in ends.into_iter().chain(spread) {
             assert_eq!((shorter(longer(s)), longer(shorter(s))), (s, s));
+            assert_eq!(longer(s), (s / WIDE_FACTOR) | (s % WIDE_FACTOR) << 32);
         }
     }
 
