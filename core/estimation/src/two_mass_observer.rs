@@ -33,10 +33,11 @@
 #![allow(clippy::arithmetic_side_effects)] // Matrices of floating-point numbers: nothing overflows.
 
 use core::fmt;
+use core::slice::from_mut;
 use flexspline::shared::num::larger;
 use flexspline::shared::{Sealed, Words};
 use flexspline::{GeneratorAngle, Joint, OutputAngle, PlayState, Prediction, Quality, Store};
-use nalgebra::{Matrix2, Matrix2x4, Matrix4, Matrix4x2, RowVector4, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix2x4, Matrix3x4, Matrix4, Matrix4x2, RowVector4, Vector2, Vector3, Vector4};
 
 /// Two inertias, at the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,10 +76,11 @@ pub struct Measured {
     pub twist_rad: f32,
 }
 
-/// A predictor: all that does not change while it runs.
+/// A predictor: all that does not change while it runs. A step checks no more than it reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoMassObserver {
-    model: Sealed<TwoMassModel>,
+    step: Sealed<StepModel>,
+    ahead: Sealed<AheadModel>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,25 +94,47 @@ struct TwoMassModel {
     stiffness: f32,
 }
 
+/// The parts of the model that a step reads: rows for the torque on the load, which stays, are not among them. In the
+/// order of memory, so that the sum loads words in pairs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct StepModel {
+    a: Matrix3x4<f32>,
+    b: Vector3<f32>,
+    gain: Matrix4x2<f32>,
+}
+
+/// The parts of the model that only a look ahead reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct AheadModel {
+    turn: [f32; 4],
+    turn_push: f32,
+    stiffness: f32,
+}
+
+flexspline::shared::words!([] AheadModel { turn, turn_push, stiffness });
+
+/// Row of the torque on the load in `a`: it stays.
+const LOAD_STAYS: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
 /// Of a matrix, by columns.
 #[inline(always)]
 fn sum_of(matrix: &[f32], sum: u64) -> u64 {
     matrix.iter().fold(sum, |sum, value| value.sum(sum))
 }
 
-impl Words for TwoMassModel {
+impl Words for StepModel {
     #[inline(always)]
     fn sum(&self, sum: u64) -> u64 {
-        let Self { a, b, gain, turn, turn_push, stiffness } = self;
-        let sum = sum_of(b.as_slice(), sum_of(a.as_slice(), sum));
-        let sum = sum_of(turn.as_slice(), sum_of(gain.as_slice(), sum));
-        stiffness.sum(turn_push.sum(sum))
+        let Self { a, b, gain } = self;
+        sum_of(gain.as_slice(), sum_of(b.as_slice(), sum_of(a.as_slice(), sum)))
     }
 
     fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
-        let Self { a, b, gain, turn, turn_push, stiffness } = self;
-        let matrices = a.iter_mut().chain(b.iter_mut()).chain(gain.iter_mut()).chain(turn.iter_mut());
-        matrices.chain([turn_push, stiffness]).for_each(|value| value.each(see));
+        let Self { a, b, gain } = self;
+        for part in [a.as_mut_slice(), b.as_mut_slice(), gain.as_mut_slice()] {
+            part.iter_mut().for_each(|value| value.each(see));
+        }
     }
 }
 
@@ -208,6 +232,8 @@ pub enum PredictorError {
         /// Factor found; below 1 is needed.
         factor: f32,
     },
+    /// The torque on the load does not stay as it is.
+    Load,
 }
 
 impl fmt::Display for PredictorError {
@@ -215,6 +241,9 @@ impl fmt::Display for PredictorError {
         match *self {
             Self::Setting { name, found } => write!(f, "{name} = {found}: must be within 1e-12 to 1e12"),
             Self::Observer { factor } => write!(f, "the observer's error grows to {factor} times in 1024 ticks"),
+            Self::Load => {
+                f.write_str("the torque on the load does not stay in a tick: its row must be 0 0 0 1, and 0 of b")
+            }
         }
     }
 }
@@ -263,6 +292,23 @@ fn row_sum(m: &Matrix4<f64>) -> f64 {
         largest = if sum <= largest { largest } else { sum };
     }
     largest
+}
+
+/// Product of two matrices, by columns: a seventh of the code where double precision is a call for each operation.
+#[inline(never)]
+fn product(a: &Matrix4<f64>, b: &Matrix4<f64>) -> Matrix4<f64> {
+    Matrix4::from_columns(&b.data.0.map(|column| times(a, &column.into())))
+}
+
+#[inline(never)]
+fn times(a: &Matrix4<f64>, column: &Vector4<f64>) -> Vector4<f64> {
+    a * column
+}
+
+/// Part of an error that a measurement leaves: identity less gain times what is measured of a state.
+fn kept_of(gain: &Matrix4x2<f64>) -> Matrix4<f64> {
+    let [by_speed, by_twist] = gain.data.0.map(Vector4::from);
+    Matrix4::identity() - Matrix4::from_columns(&[by_twist, by_speed, Vector4::zeros(), Vector4::zeros()])
 }
 
 /// Measured part of a state: ω_m, φ.
@@ -348,13 +394,23 @@ impl TwoMassObserver {
     /// Makes the model whole, where it lies in memory and an upset hit a word of it; false if it is lost, and the
     /// predictor has to be made anew. For a slow rate group: until then each step mends a copy.
     pub fn mend(&mut self) -> bool {
-        self.model.mend()
+        self.step.mend() & self.ahead.mend()
     }
 
     /// Whether the model is lost to an upset that cannot be mended.
     #[must_use]
     pub fn is_lost(&self) -> bool {
-        self.model.open().is_none()
+        self.model().is_none()
+    }
+
+    /// The whole model; `None` where a part of it is lost.
+    fn model(&self) -> Option<TwoMassModel> {
+        let (StepModel { a, b, gain }, AheadModel { turn, turn_push, stiffness }) =
+            (self.step.open()?, self.ahead.open()?);
+        let (a, b) = (a.insert_row(3, 0.0), b.push(0.0));
+        let mut model = TwoMassModel { a, b, gain, turn: turn.into(), turn_push, stiffness };
+        model.a.set_row(3, &LOAD_STAYS.into());
+        Some(model)
     }
 
     /// All numbers of a predictor, for the image of the firmware: the matrices by columns, what the load turns in a
@@ -362,10 +418,8 @@ impl TwoMassObserver {
     #[must_use]
     pub fn parts(&self) -> [f32; PREDICTOR_PARTS] {
         let mut parts = [f32::NAN; PREDICTOR_PARTS];
-        let Some(model) = self.model.open() else { return parts };
-        let numbers = model.a.iter().chain(model.b.iter()).chain(model.gain.iter()).chain(model.turn.iter());
-        let numbers = numbers.chain([&model.turn_push, &model.stiffness]);
-        parts.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
+        let Some(mut model) = self.model() else { return parts };
+        parts.iter_mut().zip(model.numbers()).for_each(|(to, from)| *to = *from);
         parts
     }
 
@@ -382,10 +436,7 @@ impl TwoMassObserver {
             turn_push: 0.0,
             stiffness: 0.0,
         };
-        let numbers = model.a.iter_mut().chain(model.b.iter_mut()).chain(model.gain.iter_mut());
-        let numbers = numbers.chain(model.turn.iter_mut());
-        let numbers = numbers.chain([&mut model.turn_push, &mut model.stiffness]);
-        numbers.zip(parts).for_each(|(to, from)| *to = *from);
+        model.numbers().zip(parts).for_each(|(to, from)| *to = *from);
         let stiffness = model.stiffness as f64;
         if !allowed(stiffness) {
             return Err(PredictorError::Setting { name: "stiffness_n_m_per_rad", found: stiffness });
@@ -402,18 +453,19 @@ impl TwoMassObserver {
     /// is.
     ///
     /// # Errors
-    /// [`PredictorError::Observer`].
+    /// [`PredictorError::Observer`], [`PredictorError::Load`].
     pub fn check(self) -> Result<Self, PredictorError> {
-        self.model.open().ok_or(PredictorError::Observer { factor: f32::NAN })?.checked()
+        self.model().ok_or(PredictorError::Observer { factor: f32::NAN })?.checked()
     }
 
     /// One tick: what the last estimate leads to, corrected by what was measured. The same work for all values.
     ///
     /// False, and the estimate stays, if a number that is used is not finite or beyond any drive (`MOST`), or the
-    /// estimate would come to be. Where the model is lost the estimate is lost with it, and says NaN: make them anew.
+    /// estimate would come to be. Where the model of a step is lost the estimate is lost with it, and says NaN: make
+    /// them anew.
     #[inline]
     pub fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
-        let done = self.model.with(|model| model.step(state, measured));
+        let done = self.step.with(|model| model.step(state, measured));
         if done.is_none() {
             *state = PredictorState::LOST;
         }
@@ -425,10 +477,9 @@ impl TwoMassObserver {
     /// Infinite where the model is lost.
     #[must_use]
     pub fn state_bound(&self, disturbance: &Disturbance) -> [f32; 4] {
-        let Some(model) = self.model.open() else { return [f32::INFINITY; 4] };
-        let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
+        let Some(model) = self.model() else { return [f32::INFINITY; 4] };
         let gain: Matrix4x2<f64> = model.gain.cast();
-        let kept = Matrix4::identity() - gain * c;
+        let kept = kept_of(&gain);
         let contract = kept * model.a.cast::<f64>();
         let Disturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad } = *disturbance;
         // What a disturbance of each kind leaves in the estimate after its tick: by columns.
@@ -466,7 +517,7 @@ impl TwoMassObserver {
     ) -> Ahead {
         let off = Vector4::from(state_bound);
         let Disturbance { torque_n_m: torque_off, load_change_n_m: load_off, .. } = *disturbance;
-        let (Some(model), Some(Estimated(start))) = (self.model.open(), state.x.open()) else { return Ahead::UNKNOWN };
+        let (Some(model), Some(Estimated(start))) = (self.model(), state.x.open()) else { return Ahead::UNKNOWN };
         let (mut x, mut ahead) = (start, Ahead::default());
         // Rows: load, motor and twist then, as they follow from a state that number of ticks before.
         let twist_now = RowVector4::new(1.0, 0.0, 0.0, 0.0);
@@ -527,7 +578,7 @@ impl TwoMassObserver {
             bound_rad: f32::INFINITY,
             quality: Quality::Disabled,
         };
-        let (Some(TwoMassModel { stiffness, .. }), Some(Estimated(x))) = (self.model.open(), state.x.open()) else {
+        let (Some(TwoMassModel { stiffness, .. }), Some(Estimated(x))) = (self.model(), state.x.open()) else {
             return unknown;
         };
         let measured_sound = now.measured.is_none() || now.measured_bound_rad.is_finite();
@@ -602,16 +653,18 @@ impl Ahead {
     };
 }
 
-impl TwoMassModel {
+impl StepModel {
     /// See [`TwoMassObserver::step`].
     #[inline(always)]
     fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
         let Some(Estimated(x)) = state.x.open() else { return false };
-        // Without an encoder at the output whatever stands there for the twist is not read.
-        let twist_used = self.gain.column(1).iter().any(|gain| *gain != 0.0);
+        // Without an encoder at the output whatever stands there for the twist is not read. Zeros of either sign.
+        let twist_used = self.gain.column(1).iter().fold(0, |bits, gain| bits | gain.to_bits()) << 1 != 0;
         let Measured { torque_n_m, speed_rad_s, twist_rad } = *measured;
         let expected = self.a * x + self.b * torque_n_m;
         let twist_rad = if twist_used { twist_rad } else { expected.x };
+        // The torque on the load stays; a zero has no sign, as in a sum.
+        let expected = expected.push(x.w + 0.0);
         let missed = Vector2::new(speed_rad_s, twist_rad) - measured_of(&expected);
         let next = expected + self.gain * missed;
         let sound = is_possible(&Vector4::new(twist_rad, speed_rad_s, 0.0, torque_n_m)) & is_possible(&next);
@@ -620,24 +673,38 @@ impl TwoMassModel {
         }
         sound
     }
+}
+
+impl TwoMassModel {
+    /// Its numbers in the order of [`TwoMassObserver::parts`].
+    fn numbers(&mut self) -> impl Iterator<Item = &mut f32> {
+        let Self { a, b, gain, turn, turn_push, stiffness } = self;
+        let (push, stiffness) = (from_mut(turn_push), from_mut(stiffness));
+        let parts = [a.as_mut_slice(), b.as_mut_slice(), gain.as_mut_slice(), turn.as_mut_slice(), push, stiffness];
+        parts.into_iter().flatten()
+    }
 
     /// See [`TwoMassObserver::check`].
     fn checked(self) -> Result<TwoMassObserver, PredictorError> {
-        let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
-        let gain: Matrix4x2<f64> = self.gain.cast();
-        let mut error = (Matrix4::identity() - gain * c) * self.a.cast::<f64>();
+        let mut error = product(&kept_of(&self.gain.cast()), &self.a.cast());
         // Scaled to one tick's units, so that rows of different units are alike.
         let scale = Vector4::new(1e4, 1e2, 1e2, 1e-1);
-        error = Matrix4::from_diagonal(&scale) * error * Matrix4::from_diagonal(&scale.map(|s| 1.0 / s));
+        error = product(&Matrix4::from_diagonal(&scale), &error);
+        error = product(&error, &Matrix4::from_diagonal(&scale.map(|s| 1.0 / s)));
         for _ in 0..SQUARINGS {
-            error *= error;
+            error = product(&error, &error);
         }
         let factor = row_sum(&error) as f32;
-        if factor < 1.0 {
-            Ok(TwoMassObserver { model: Sealed::new(self) })
-        } else {
-            Err(PredictorError::Observer { factor })
+        if factor >= 1.0 || factor.is_nan() {
+            return Err(PredictorError::Observer { factor });
         }
+        let Self { a, b, gain, turn, turn_push, stiffness } = self;
+        if a.row(3) != RowVector4::from(LOAD_STAYS) || b.w != 0.0 {
+            return Err(PredictorError::Load);
+        }
+        let step = StepModel { a: a.remove_row(3), b: b.xyz(), gain };
+        let ahead = AheadModel { turn: turn.transpose().into(), turn_push, stiffness };
+        Ok(TwoMassObserver { step: Sealed::new(step), ahead: Sealed::new(ahead) })
     }
 }
 
@@ -691,7 +758,7 @@ impl PredictorState {
 }
 
 #[cfg(any(test, feature = "testing"))]
-flexspline::testing::upsets!(TwoMassObserver { model });
+flexspline::testing::upsets!(TwoMassObserver { step, ahead });
 #[cfg(any(test, feature = "testing"))]
 flexspline::testing::upsets!(PredictorState { x });
 
@@ -814,7 +881,8 @@ mod tests {
             let mut farthest = Vector4::zeros();
             for tick in 0..20_000 {
                 let sign = if tick < 5000 { 1.0 } else { (tick as f32 * 0.2).sin().signum() };
-                truth = predictor.model.kept().a * truth + predictor.model.kept().b * (10.0 + sign * off.torque_n_m);
+                let model = predictor.model().unwrap();
+                truth = model.a * truth + model.b * (10.0 + sign * off.torque_n_m);
                 truth.w += if tick % 2 == 0 { off.load_change_n_m } else { -off.load_change_n_m };
                 truth.w = truth.w.clamp(-50.0, 50.0);
                 let measured = Measured {
@@ -1038,15 +1106,23 @@ mod tests {
             TwoMassObserver::from_parts(&good_parts()),
             Ok(TwoMassObserver::new(INERTIAS, NOISE, TICK_S).unwrap())
         );
-        for (place, value) in
-            [(0, f32::NAN), (17, f32::INFINITY), (21, 5.0), (29, f32::NAN), (32, f32::INFINITY), (33, 0.0)]
-        {
+        for (place, value) in [
+            (0, f32::NAN),
+            (3, 1e-9),
+            (15, 0.999),
+            (17, f32::INFINITY),
+            (19, 1e-3),
+            (21, 5.0),
+            (29, f32::NAN),
+            (32, f32::INFINITY),
+            (33, 0.0),
+        ] {
             let mut parts = good_parts();
             parts[place] = value;
             assert!(TwoMassObserver::from_parts(&parts).is_err(), "{place}");
         }
         // One that was damaged on its way, or made for another machine.
-        let good = *TwoMassObserver::new(INERTIAS, NOISE, TICK_S).unwrap().model.kept();
+        let good = TwoMassObserver::new(INERTIAS, NOISE, TICK_S).unwrap().model().unwrap();
         let wild = TwoMassModel { gain: good.gain * -3.0, ..good };
         assert!(matches!(wild.checked(), Err(PredictorError::Observer { factor }) if factor.is_nan() || factor > 1.0));
         let undefined = TwoMassModel { a: good.a * f32::NAN, ..good };
