@@ -91,8 +91,6 @@
 )]
 
 mod adapt;
-#[cfg(feature = "defmt")]
-mod defmt;
 mod maxwell_slip;
 mod online_calibration;
 mod two_mass_observer;

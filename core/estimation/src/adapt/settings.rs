@@ -2,9 +2,8 @@
 
 use core::fmt;
 
-/// A coefficient beside the table.
+/// A coefficient in addition to the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Term {
     /// Offset of the mean error, rad.
     Mean,
@@ -40,8 +39,8 @@ pub struct AdaptSettings<const N: usize> {
     pub memory_measurements: f32,
     /// Standard deviations beyond which an innovation is an outlier: 1 to 100.
     pub gate: f32,
-    /// Way at the output after a reversal that is left out beside four times the limit of the half-width, rad: elastic
-    /// hysteresis; 0 to 0.05.
+    /// Way at the output after a reversal that is left out in addition to four times the limit of the half-width,
+    /// rad: elastic hysteresis; 0 to 0.05.
     pub settle_rad: f32,
     /// Torque beyond which the wind-up's share grows no more, N·m.
     pub torque_limit_n_m: f32,
@@ -49,7 +48,6 @@ pub struct AdaptSettings<const N: usize> {
 
 /// Which setting cannot be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AdaptError {
     /// Name of the setting.
     pub name: &'static str,
@@ -67,7 +65,6 @@ impl core::error::Error for AdaptError {}
 
 /// Why saved bytes are no state of this adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdaptRestoreError {
     /// Fewer bytes than this number of coefficients takes.
     Short {

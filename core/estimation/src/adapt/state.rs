@@ -5,7 +5,6 @@ use flexspline::{GeneratorAngle, OutputAngle};
 
 /// Whether measurements change anything.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Learning {
     /// The adjustment is zero; what was learnt is kept. The start.
     #[default]
@@ -18,7 +17,6 @@ pub enum Learning {
 
 /// Verdict on a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// There was none, or nothing is to be learnt.
     Idle,
@@ -35,13 +33,12 @@ pub enum Verdict {
     /// The tick itself was not to be trusted: sample lost or not believed, torque out of range or not finite, table in
     /// doubt.
     Untrusted,
-    /// What was learnt, or the settings, are lost to an upset: nothing is added.
+    /// Learnt coefficients or settings are lost to an upset: nothing is added.
     Lost,
 }
 
 /// How many measurements of each [`Verdict`], and what else happened; all stop at their largest value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AdaptCounters {
     /// [`Verdict::Used`].
     pub used: u32,
