@@ -45,8 +45,6 @@ mod defmt;
 mod events;
 mod records;
 
-#[cfg(feature = "defmt")]
-pub use defmt::Logged;
 pub use events::{Event, Events, Watch};
 #[doc(hidden)] // For the C interface.
 pub use records::is_due;
