@@ -38,6 +38,22 @@ pub enum Health {
     Torn,
 }
 
+impl Health {
+    const ALL: [Self; 5] = [Self::Sound, Self::OneImage, Self::Lost, Self::Empty, Self::Torn];
+
+    /// As a number: of telemetry and of the C interface.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// From its number, if it is one.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(code as usize).copied()
+    }
+}
+
 /// Why a table was not activated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ActivateError {
@@ -87,3 +103,14 @@ impl core::error::Error for ActivateError {}
 
 #[cfg(any(test, feature = "testing"))]
 crate::upset::upsets!(Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes });
+
+#[cfg(test)]
+mod tests {
+    use super::Health;
+
+    #[test]
+    fn a_health_comes_back_from_its_number() {
+        assert!((0..).zip(Health::ALL).all(|(n, h)| h.code() == n && Health::from_code(n) == Some(h)));
+        assert_eq!((Health::Torn.code(), Health::from_code(5)), (4, None));
+    }
+}

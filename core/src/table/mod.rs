@@ -74,26 +74,13 @@ impl GeneratorKind {
     /// The code in an image.
     #[must_use]
     pub const fn code(self) -> u8 {
-        match self {
-            Self::Other => 0,
-            Self::TwoRoller => 1,
-            Self::FourRoller => 2,
-            Self::DoubleDisc => 3,
-            Self::Cam => 4,
-        }
+        self as u8
     }
 
     /// From the code in an image.
     #[must_use]
-    pub const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Other),
-            1 => Some(Self::TwoRoller),
-            2 => Some(Self::FourRoller),
-            3 => Some(Self::DoubleDisc),
-            4 => Some(Self::Cam),
-            _ => None,
-        }
+    pub fn from_code(code: u8) -> Option<Self> {
+        [Self::Other, Self::TwoRoller, Self::FourRoller, Self::DoubleDisc, Self::Cam].get(code as usize).copied()
     }
 }
 

@@ -20,6 +20,22 @@ pub enum Quality {
     Disabled,
 }
 
+impl Quality {
+    const ALL: [Self; 4] = [Self::InRange, Self::Uncertain, Self::Extrapolated, Self::Disabled];
+
+    /// As a number: of telemetry and of the C interface.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// From its number, if it is one.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(code as usize).copied()
+    }
+}
+
 /// A torque and temperature, located in the table: [`Table::at`](crate::Table::at). What forward and inverse of one
 /// tick share.
 #[derive(Clone, Copy, Debug)]
@@ -154,6 +170,12 @@ impl OperatingPoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_quality_comes_back_from_its_number() {
+        assert!((0..).zip(Quality::ALL).all(|(n, q)| q.code() == n && Quality::from_code(n) == Some(q)));
+        assert_eq!((Quality::Disabled.code(), Quality::from_code(4)), (3, None));
+    }
 
     fn point(mean: f32, half_width: f32) -> OperatingPoint {
         let place = TorquePlace { weight: 0.0, width: 1.0, jump: false };

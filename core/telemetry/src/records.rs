@@ -162,24 +162,11 @@ impl Record {
     /// As bytes. Not in the tick: the checksum alone takes some 250 instructions.
     #[must_use]
     pub fn encode(&self) -> [u8; RECORD_BYTES] {
-        let quality = match self.quality {
-            Quality::InRange => 0,
-            Quality::Uncertain => 1,
-            Quality::Extrapolated => 2,
-            Quality::Disabled => 3,
-        };
-        let mode = (self.mode.code() as u8) << 2;
-        let health = match self.health {
-            Health::Sound => 0,
-            Health::OneImage => 1 << 4,
-            Health::Lost => 2 << 4,
-            Health::Empty => 3 << 4,
-            Health::Torn => 4 << 4,
-        };
+        let states = self.quality.code() | (self.mode.code() as u8) << 2 | self.health.code() << 4;
         let pair = |low: u16, high: u16| low as u32 | (high as u32) << 16;
         let [mark, x] = MARK;
         let words = [
-            u32::from_le_bytes([mark, x, VERSION, quality | mode | health]),
+            u32::from_le_bytes([mark, x, VERSION, states]),
             pair(self.number, self.lost),
             self.tick,
             pair(self.flags, self.missed_ticks),
@@ -219,26 +206,13 @@ impl Record {
         if stated != computed {
             return Err(RecordError::Crc { stated, computed });
         }
-        let health = match states >> 4 {
-            0 => Health::Sound,
-            1 => Health::OneImage,
-            2 => Health::Lost,
-            3 => Health::Empty,
-            4 => Health::Torn,
-            _ => return Err(RecordError::Reserved),
-        };
         Ok(Self {
             number: low(1),
             lost: high(1),
             tick: word(2),
-            quality: match states & 3 {
-                0 => Quality::InRange,
-                1 => Quality::Uncertain,
-                2 => Quality::Extrapolated,
-                _ => Quality::Disabled,
-            },
+            quality: Quality::from_code(states & 3).ok_or(RecordError::Reserved)?,
             mode: Mode::from_code((states >> 2 & 3) as u32),
-            health,
+            health: Health::from_code(states >> 4).ok_or(RecordError::Reserved)?,
             flags: low(3),
             missed_ticks: high(3),
             output_counts: (word(5) as i64) << 32 | word(4) as i64,

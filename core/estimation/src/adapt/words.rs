@@ -44,11 +44,7 @@ impl Learning {
     pub(super) const LOST: u32 = 3;
 
     pub(super) const fn code(self) -> u32 {
-        match self {
-            Self::Off => 0,
-            Self::Frozen => 1,
-            Self::On => 2,
-        }
+        self as u32
     }
 
     /// Back from its code.
