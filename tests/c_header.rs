@@ -18,7 +18,11 @@ fn kept_header() -> String {
 fn the_header_is_up_to_date() {
     let config = cbindgen::Config::from_file(core().join("c_api/cbindgen.toml")).unwrap();
     // It finds the modules of the crate by itself.
-    let builder = cbindgen::Builder::new().with_config(config).with_src(core().join("c_api/src/lib.rs"));
+    let builder = cbindgen::Builder::new()
+        .with_config(config)
+        .with_src(core().join("c_api/src/lib.rs"))
+        .with_src(core().join("estimation/src/two_mass_observer.rs"))
+        .with_src(core().join("src/joint/start_up.rs"));
     let mut made = Vec::new();
     builder.generate().expect("cbindgen reads the C interface").write(&mut made);
     let made = String::from_utf8(made).unwrap();

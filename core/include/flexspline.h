@@ -134,10 +134,10 @@
 // Offset of the mean error, rad.
 #define FLEXSPLINE_TERM_MEAN 0
 
-// Wind-up beside that of the table, rad/(N m).
+// Wind-up in addition to that of the table, rad/(N m).
 #define FLEXSPLINE_TERM_WIND_UP 1
 
-// Half-width of the play beside that of the table, rad.
+// Half-width of the play in addition to that of the table, rad.
 #define FLEXSPLINE_TERM_HALF_WIDTH 2
 
 // Cosine of `order` periods in a generator turn, rad.
@@ -176,7 +176,7 @@
 // The tick itself was not to be trusted.
 #define FLEXSPLINE_VERDICT_UNTRUSTED 6
 
-// What was learnt, or the settings, are lost to an upset: nothing is added, and the uncertainty is all that can have
+// Learnt coefficients or settings are lost to an upset: nothing is added, and the uncertainty is all that can have
 // been added. Until `flexspline_learner_set`, or until the learner is made anew.
 #define FLEXSPLINE_VERDICT_LOST 7
 
@@ -516,7 +516,7 @@ typedef struct FlexsplineOutput {
   uint16_t flags;
 } FlexsplineOutput;
 
-// What is added to the table in the next tick, and how far it is known, under a sum: an upset of one word is mended.
+// Addition to the table in the next tick, and how far it is known, under a sum: an upset of one word is mended.
 typedef struct FlexsplineAdjustment {
   uint64_t opaque[FLEXSPLINE_ADJUSTMENT_WORDS];
 } FlexsplineAdjustment;
@@ -631,7 +631,7 @@ typedef struct FlexsplineInertias {
   double load_kg_m2;
   // Torsional stiffness, N m/rad: the slope of the wind-up.
   double stiffness_n_m_per_rad;
-  // Damping beside it, N m s/rad.
+  // Damping parallel to it, N m s/rad.
   double damping_n_m_s_per_rad;
 } FlexsplineInertias;
 
@@ -755,8 +755,8 @@ typedef struct FlexsplineLearnSettings {
   float memory_measurements;
   // Standard deviations beyond which an innovation is an outlier: 1 to 100.
   float gate;
-  // Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to
-  // 0.049.
+  // Way at the output after a reversal that is left out in addition to four times the limit of the half-width,
+  // rad; 0 to 0.049.
   float settle_rad;
   // Torque beyond which the wind-up's share grows no more, N m.
   float torque_limit_n_m;
@@ -1319,7 +1319,7 @@ enum FlexsplineStatus flexspline_learner_reset(struct FlexsplineLearner *learner
 // One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output
 // angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and reports
 // the addition in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
-// with the learner's own adjustment alone: what springs or a model of yours added beside it counts as known then, and
+// with the learner's own adjustment alone: what springs or a model of yours added to it counts as known then, and
 // is not learnt a second time.
 enum FlexsplineStatus flexspline_learner_update(struct FlexsplineLearner *learner,
                                                 const struct FlexsplineState *state,

@@ -1,13 +1,6 @@
 //! Questions to a table outside a tick.
 
-use super::names::{FLEXSPLINE_FIXED_CIRCULAR_SPLINE, FLEXSPLINE_FIXED_FLEXSPLINE};
-use super::{
-    FlexsplineJoint, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object, apart, bytes, clear, get, give,
-    image_status, quality_code, span, status, usable,
-};
-use flexspline::{
-    Approach, Direction, FixedMember, GeneratorAngle, Joint, JointState, OutputAngle, PlayState, Store, Table,
-};
+use super::*;
 
 /// Expected motion of the output.
 #[repr(C)]
@@ -95,25 +88,18 @@ pub extern "C" fn flexspline_forward(
     torque_n_m: f32,
     prediction: *mut FlexsplinePrediction,
 ) -> FlexsplineStatus {
-    let ask = || {
-        clear(span(prediction), [span(joint), span(store), span(state)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
-        let state: &JointState = get(state, Object::State)?;
-        let mut play: PlayState = *state.play();
-        let found = joint.forward(store, &mut play, GeneratorAngle::from_counts(generator_counts), torque_n_m);
-        give(
-            prediction,
-            FlexsplinePrediction {
-                output_counts: found.output.counts(),
-                nominal_counts: found.nominal.counts(),
-                transmission_error_rad: found.transmission_error_rad,
-                uncertainty_rad: found.uncertainty_rad,
-                quality: quality_code(found.quality),
-            },
-        )
-    };
-    status(ask())
+    answer(prediction, [span(joint), span(store), span(state)], || {
+        let mut play: PlayState = *state_of(state)?.play();
+        let generator = GeneratorAngle::from_counts(generator_counts);
+        let found = joint_of(joint)?.forward(store_of(store)?, &mut play, generator, torque_n_m);
+        Ok(FlexsplinePrediction {
+            output_counts: found.output.counts(),
+            nominal_counts: found.nominal.counts(),
+            transmission_error_rad: found.transmission_error_rad,
+            uncertainty_rad: found.uncertainty_rad,
+            quality: found.quality.code(),
+        })
+    })
 }
 
 /// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion
@@ -128,29 +114,20 @@ pub extern "C" fn flexspline_inverse(
     direction: i8,
     command: *mut FlexsplineCommand,
 ) -> FlexsplineStatus {
-    let ask = || {
-        clear(span(command), [span(joint), span(store), span(state)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
-        let state: &JointState = get(state, Object::State)?;
+    answer(command, [span(joint), span(store), span(state)], || {
+        let (joint, store, state) = (joint_of(joint)?, store_of(store)?, state_of(state)?);
         let approach = match direction {
-            1 => Approach::Moving(Direction::Forward),
-            -1 => Approach::Moving(Direction::Backward),
             0 => Approach::From(state.play()),
-            _ => return Err(FlexsplineStatus::Argument),
+            sign => Approach::Moving(direction_of(sign)?),
         };
         let found = joint.inverse(store, OutputAngle::from_counts(target_counts), torque_n_m, approach);
-        give(
-            command,
-            FlexsplineCommand {
-                generator_counts: found.generator.counts(),
-                predicted_error_rad: found.predicted_error_rad,
-                uncertainty_rad: found.uncertainty_rad,
-                quality: quality_code(found.quality),
-            },
-        )
-    };
-    status(ask())
+        Ok(FlexsplineCommand {
+            generator_counts: found.generator.counts(),
+            predicted_error_rad: found.predicted_error_rad,
+            uncertainty_rad: found.uncertainty_rad,
+            quality: found.quality.code(),
+        })
+    })
 }
 
 /// Nominal output angle of a generator angle, counts of 2^-32 turn: generator over ratio.
@@ -160,12 +137,8 @@ pub extern "C" fn flexspline_nominal_output(
     generator_counts: i64,
     output_counts: *mut i64,
 ) -> FlexsplineStatus {
-    let ask = || {
-        apart([span(joint), span(output_counts)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        give(output_counts, joint.drive().nominal_output(GeneratorAngle::from_counts(generator_counts)).counts())
-    };
-    status(ask())
+    let generator = GeneratorAngle::from_counts(generator_counts);
+    answer(output_counts, [span(joint)], || Ok(joint_of(joint)?.drive().nominal_output(generator).counts()))
 }
 
 /// Generator angle whose nominal output is an output angle, counts of 2^-32 turn: output times ratio.
@@ -175,45 +148,30 @@ pub extern "C" fn flexspline_nominal_generator(
     output_counts: i64,
     generator_counts: *mut i64,
 ) -> FlexsplineStatus {
-    let ask = || {
-        apart([span(joint), span(generator_counts)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        give(generator_counts, joint.drive().nominal_generator(OutputAngle::from_counts(output_counts)).counts())
-    };
-    status(ask())
+    let output = OutputAngle::from_counts(output_counts);
+    answer(generator_counts, [span(joint)], || Ok(joint_of(joint)?.drive().nominal_generator(output).counts()))
 }
 
 /// Ratio of a joint's drive, signed: generator turns in a turn of the output.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_ratio(joint: *const FlexsplineJoint, ratio: *mut f32) -> FlexsplineStatus {
-    let ask = || {
-        apart([span(joint), span(ratio)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        give(ratio, joint.drive().ratio())
-    };
-    status(ask())
+    answer(ratio, [span(joint)], || Ok(joint_of(joint)?.drive().ratio()))
 }
 
 /// Reports the position of a drive inside its play, as the last tick left it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_play(state: *const FlexsplineState, play: *mut FlexsplinePlay) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(state), span(play)])?;
-        let state: &JointState = get(state, Object::State)?;
-        let found = state.play();
-        give(
-            play,
-            FlexsplinePlay {
-                nominal_counts: found.nominal().map_or(0, OutputAngle::counts),
-                output_counts: found.output().map_or(0, OutputAngle::counts),
-                offset_rad: found.offset_rad(),
-                uncertainty_rad: found.uncertainty_rad(),
-                is_known: found.is_known() as u8,
-                is_started: found.nominal().is_some() as u8,
-            },
-        )
-    };
-    status(fill())
+    answer(play, [span(state)], || {
+        let found = state_of(state)?.play();
+        Ok(FlexsplinePlay {
+            nominal_counts: found.nominal().map_or(0, OutputAngle::counts),
+            output_counts: found.output().map_or(0, OutputAngle::counts),
+            offset_rad: found.offset_rad(),
+            uncertainty_rad: found.uncertainty_rad(),
+            is_known: found.is_known() as u8,
+            is_started: found.nominal().is_some() as u8,
+        })
+    })
 }
 
 /// Checks one image in full, without a store, and reports its header. The work grows with the image: for
@@ -224,32 +182,25 @@ pub extern "C" fn flexspline_image_report(
     image_bytes: usize,
     report: *mut FlexsplineImageReport,
 ) -> FlexsplineStatus {
-    let fill = || {
-        usable(report)?;
-        let read = bytes(image, image_bytes)?;
-        apart([(image as usize, image_bytes), span(report)])?;
-        let table = Table::check(read).map_err(image_status)?;
+    answer(report, [(image as usize, image_bytes)], || {
+        let table = Table::check(bytes(image, image_bytes)?).map_err(image_status)?;
         let drive = table.drive();
-        give(
-            report,
-            FlexsplineImageReport {
-                table_id: table.id().0,
-                torque_range_n_m: table.torque_range_n_m(),
-                temperature_range_c: table.temperature_range_c(),
-                error_limit_rad: table.error_limit_rad(),
-                projection_worst_rad: table.projection_worst_rad(),
-                projection_rms_rad: table.projection_rms_rad(),
-                flexspline_teeth: drive.flexspline_teeth(),
-                circular_spline_teeth: drive.circular_spline_teeth(),
-                fixed_member: match drive.fixed() {
-                    FixedMember::Flexspline => FLEXSPLINE_FIXED_FLEXSPLINE,
-                    FixedMember::CircularSpline => FLEXSPLINE_FIXED_CIRCULAR_SPLINE,
-                },
-                generator: table.generator_kind().code(),
+        Ok(FlexsplineImageReport {
+            table_id: table.id().0,
+            torque_range_n_m: table.torque_range_n_m(),
+            temperature_range_c: table.temperature_range_c(),
+            error_limit_rad: table.error_limit_rad(),
+            projection_worst_rad: table.projection_worst_rad(),
+            projection_rms_rad: table.projection_rms_rad(),
+            flexspline_teeth: drive.flexspline_teeth(),
+            circular_spline_teeth: drive.circular_spline_teeth(),
+            fixed_member: match drive.fixed() {
+                FixedMember::Flexspline => FLEXSPLINE_FIXED_FLEXSPLINE,
+                FixedMember::CircularSpline => FLEXSPLINE_FIXED_CIRCULAR_SPLINE,
             },
-        )
-    };
-    status(fill())
+            generator: table.generator_kind().code(),
+        })
+    })
 }
 
 /// How far units scatter about a table that a data sheet completed, as a share s of their stiffness: 0.3 of `+-30 %`; 0
@@ -261,12 +212,8 @@ pub extern "C" fn flexspline_image_sheet_scatter(
     image_bytes: usize,
     scatter: *mut f32,
 ) -> FlexsplineStatus {
-    let fill = || {
-        usable(scatter)?;
-        let read = bytes(image, image_bytes)?;
-        apart([(image as usize, image_bytes), span(scatter)])?;
-        let table = Table::check(read).map_err(image_status)?;
-        give(scatter, table.sheet_scatter().unwrap_or(0.0))
-    };
-    status(fill())
+    answer(scatter, [(image as usize, image_bytes)], || {
+        let table = Table::check(bytes(image, image_bytes)?).map_err(image_status)?;
+        Ok(table.sheet_scatter().unwrap_or(0.0))
+    })
 }

@@ -1,19 +1,17 @@
 //! Work next to the tick: a table received in chunks, events, records for the ground, an observer and what lies
 //! ahead.
 
-use super::names::*;
-use super::{
-    FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object, apart, bytes, clear,
-    copied, get, get_mut, give, image_status, put, span, status, usable,
-};
-use core::mem::MaybeUninit;
-use flexspline::{
-    Flags, GeneratorAngle, Health, Joint, JointState, Mode, Output, OutputAngle, Quality, Store, Upload, UploadError,
-};
+use super::*;
+use flexspline::{Upload, UploadError};
 use flexspline_estimation::{
     Disturbance, Inertias, Measured, Noise, Now, PREDICTOR_PARTS, PredictorState, TwoMassObserver,
 };
 use flexspline_telemetry::{Event, RECORD_BYTES, Record, Watch};
+
+// The same in C: cbindgen renames them.
+pub use flexspline_estimation::{
+    Disturbance as FlexsplineDisturbance, Inertias as FlexsplineInertias, Measured as FlexsplineMeasured,
+};
 
 /// Bytes of a record of telemetry.
 pub const FLEXSPLINE_RECORD_BYTES: usize = 52;
@@ -95,18 +93,6 @@ pub struct FlexsplineEvents {
     pub damaged_page: u8,
 }
 
-/// Measurements of a tick, for the observer.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct FlexsplineMeasured {
-    /// Motor torque times the ratio in the tick before, N m.
-    pub torque_n_m: f32,
-    /// Motor speed over the ratio, rad/s.
-    pub speed_rad_s: f32,
-    /// Twist, rad: only used if the predictor was made with a noise for it.
-    pub twist_rad: f32,
-}
-
 /// Estimates of an observer, to read.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
@@ -161,20 +147,6 @@ pub struct FlexsplineAhead {
     pub quality: u8,
 }
 
-/// Two inertias, at the output.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct FlexsplineInertias {
-    /// Motor, generator and what turns with them: their inertia times the square of the ratio, kg m^2.
-    pub motor_kg_m2: f64,
-    /// Load, kg m^2.
-    pub load_kg_m2: f64,
-    /// Torsional stiffness, N m/rad: the slope of the wind-up.
-    pub stiffness_n_m_per_rad: f64,
-    /// Damping beside it, N m s/rad.
-    pub damping_n_m_s_per_rad: f64,
-}
-
 /// How much of what is measured and assumed can be trusted: standard deviations.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -191,20 +163,6 @@ pub struct FlexsplineNoise {
     pub has_twist: u8,
 }
 
-/// How far what is measured and assumed can be off: bounds, each +-.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct FlexsplineDisturbance {
-    /// Motor torque at the output, N m.
-    pub torque_n_m: f32,
-    /// Change of the torque on the load in a tick, N m.
-    pub load_change_n_m: f32,
-    /// Motor speed over the ratio as measured, rad/s.
-    pub speed_rad_s: f32,
-    /// Twist as measured, rad; of no matter without an encoder at the output.
-    pub twist_rad: f32,
-}
-
 /// Announced and received bytes.
 #[derive(Clone, Copy)]
 struct ReceptionProgress {
@@ -213,48 +171,6 @@ struct ReceptionProgress {
 }
 
 const _: () = assert!(FLEXSPLINE_RECORD_BYTES == RECORD_BYTES && FLEXSPLINE_PREDICTOR_PARTS == PREDICTOR_PARTS);
-
-pub(super) const fn quality_code(quality: Quality) -> u8 {
-    match quality {
-        Quality::InRange => FLEXSPLINE_QUALITY_IN_RANGE,
-        Quality::Uncertain => FLEXSPLINE_QUALITY_UNCERTAIN,
-        Quality::Extrapolated => FLEXSPLINE_QUALITY_EXTRAPOLATED,
-        Quality::Disabled => FLEXSPLINE_QUALITY_DISABLED,
-    }
-}
-
-pub(super) const fn health_code(health: Health) -> u8 {
-    match health {
-        Health::Sound => FLEXSPLINE_HEALTH_SOUND,
-        Health::OneImage => FLEXSPLINE_HEALTH_ONE_IMAGE,
-        Health::Lost => FLEXSPLINE_HEALTH_LOST,
-        Health::Empty => FLEXSPLINE_HEALTH_EMPTY,
-        Health::Torn => FLEXSPLINE_HEALTH_TORN,
-    }
-}
-
-/// Back from its number.
-pub(super) const fn quality_of(code: u8) -> Result<Quality, FlexsplineStatus> {
-    Ok(match code {
-        FLEXSPLINE_QUALITY_IN_RANGE => Quality::InRange,
-        FLEXSPLINE_QUALITY_UNCERTAIN => Quality::Uncertain,
-        FLEXSPLINE_QUALITY_EXTRAPOLATED => Quality::Extrapolated,
-        FLEXSPLINE_QUALITY_DISABLED => Quality::Disabled,
-        _ => return Err(FlexsplineStatus::Argument),
-    })
-}
-
-/// Back from its number.
-pub(super) const fn health_of(code: u8) -> Result<Health, FlexsplineStatus> {
-    Ok(match code {
-        FLEXSPLINE_HEALTH_SOUND => Health::Sound,
-        FLEXSPLINE_HEALTH_ONE_IMAGE => Health::OneImage,
-        FLEXSPLINE_HEALTH_LOST => Health::Lost,
-        FLEXSPLINE_HEALTH_EMPTY => Health::Empty,
-        FLEXSPLINE_HEALTH_TORN => Health::Torn,
-        _ => return Err(FlexsplineStatus::Argument),
-    })
-}
 
 /// Output of a tick, back from C.
 pub(super) fn given(output: *const FlexsplineOutput) -> Result<Output, FlexsplineStatus> {
@@ -266,9 +182,13 @@ pub(super) fn given(output: *const FlexsplineOutput) -> Result<Output, Flexsplin
         uncertainty_rad: found.uncertainty_rad,
         correction_rad: found.correction_rad,
         held_back_rad: found.held_back_rad,
-        quality: quality_of(found.quality)?,
+        quality: Quality::from_code(found.quality).ok_or(FlexsplineStatus::Argument)?,
         flags: Flags::of_bits(found.flags),
     })
+}
+
+fn predictor_of<'a>(predictor: *const FlexsplinePredictor) -> Result<&'a TwoMassObserver, FlexsplineStatus> {
+    get(predictor, Object::Predictor)
 }
 
 fn upload_status(error: UploadError) -> FlexsplineStatus {
@@ -284,7 +204,7 @@ fn upload_status(error: UploadError) -> FlexsplineStatus {
 /// image in use.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_upload_begin(upload: *mut FlexsplineUpload, announced: usize) -> FlexsplineStatus {
-    status(put(upload, Object::Upload, ReceptionProgress { announced, received: 0 }))
+    status(|| put(upload, Object::Upload, ReceptionProgress { announced, received: 0 }))
 }
 
 /// Takes the bytes from `offset` on: `FLEXSPLINE_STATUS_ORDER` if they are not the next ones, which can still come.
@@ -297,24 +217,15 @@ pub extern "C" fn flexspline_upload_chunk(
     chunk: *const u8,
     chunk_bytes: usize,
 ) -> FlexsplineStatus {
-    let take = || {
-        usable(buffer)?;
-        let chunk_read = bytes(chunk, chunk_bytes)?;
-        let (upload_span, buffer_span) = (span(upload), (buffer as usize, buffer_bytes));
-        apart([upload_span, buffer_span, (chunk as usize, chunk_bytes)])?;
+    status(|| {
+        apart([span(upload), (buffer as usize, buffer_bytes), (chunk as usize, chunk_bytes)])?;
+        let (buffer, chunk) = (bytes_mut(buffer, buffer_bytes)?, bytes(chunk, chunk_bytes)?);
         let progress: &mut ReceptionProgress = get_mut(upload, Object::Upload)?;
-        if buffer_bytes > isize::MAX as usize {
-            return Err(FlexsplineStatus::Argument);
-        }
-        // SAFETY: not null, apart from the other objects; the caller guarantees this length, and the bytes are
-        // its own.
-        let buffer = unsafe { core::slice::from_raw_parts_mut(buffer, buffer_bytes) };
         let mut resumed = Upload::resume(buffer, progress.announced, progress.received).map_err(upload_status)?;
-        resumed.chunk(offset, chunk_read).map_err(upload_status)?;
+        resumed.chunk(offset, chunk).map_err(upload_status)?;
         progress.received = resumed.received();
         Ok(())
-    };
-    status(take())
+    })
 }
 
 /// Checks a table of which all bytes came, in full, and reports its id; it can then be activated.
@@ -325,23 +236,18 @@ pub extern "C" fn flexspline_upload_finish(
     buffer_bytes: usize,
     table_id: *mut [u8; 8],
 ) -> FlexsplineStatus {
-    let finish = || {
-        let image = bytes(buffer, buffer_bytes)?;
-        apart([span(upload), (buffer as usize, buffer_bytes), span(table_id)])?;
-        usable(table_id)?;
+    answer(table_id, [span(upload), (buffer as usize, buffer_bytes)], || {
+        apart([span(upload), (buffer as usize, buffer_bytes)])?;
         let &ReceptionProgress { announced, received } = get(upload, Object::Upload)?;
-        let id = Upload::check(image, announced, received).map_err(upload_status)?.id();
-        // SAFETY: not null, apart from what is borrowed; the caller's.
-        unsafe { table_id.write(id.0) };
-        Ok(())
-    };
-    status(finish())
+        let found = Upload::check(bytes(buffer, buffer_bytes)?, announced, received).map_err(upload_status)?;
+        Ok(found.id().0)
+    })
 }
 
 /// Begins to watch for events: off, without a table.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_watch_init(watch: *mut FlexsplineWatch) -> FlexsplineStatus {
-    status(put(watch, Object::Watch, Watch::new()))
+    status(|| put(watch, Object::Watch, Watch::new()))
 }
 
 /// Reports the changes, after `flexspline_tick`; `output` is that tick's output.
@@ -353,27 +259,19 @@ pub extern "C" fn flexspline_watch_see(
     output: *const FlexsplineOutput,
     events: *mut FlexsplineEvents,
 ) -> FlexsplineStatus {
-    let see = || {
-        for written in [span(watch), span(events)] {
-            for read in [span(state), span(store), span(output)] {
-                apart([written, read])?;
-            }
-        }
-        apart([span(watch), span(events)])?;
-        usable(events)?;
+    answer(events, [span(watch), span(state), span(store), span(output)], || {
+        clear(span(watch), [span(state), span(store), span(output)])?;
         let given = given(output)?;
-        let state: &JointState = get(state, Object::State)?;
-        let store: &Store = get(store, Object::Store)?;
         let watch: &mut Watch = get_mut(watch, Object::Watch)?;
         let mut filled = FlexsplineEvents::default();
-        for event in watch.see(state, store, &given).iter() {
+        for event in watch.see(state_of(state)?, store_of(store)?, &given).iter() {
             filled.events |= match event {
                 Event::Mode { from, to } => {
                     (filled.mode_before, filled.mode) = (Mode::code(from) as u8, Mode::code(to) as u8);
                     FLEXSPLINE_EVENT_MODE
                 }
                 Event::Health { from, to } => {
-                    (filled.health_before, filled.health) = (health_code(from), health_code(to));
+                    (filled.health_before, filled.health) = (from.code(), to.code());
                     FLEXSPLINE_EVENT_HEALTH
                 }
                 Event::PageDamaged { image, page } => {
@@ -390,11 +288,8 @@ pub extern "C" fn flexspline_watch_see(
                 Event::StateTorn => FLEXSPLINE_EVENT_STATE_TORN,
             };
         }
-        // SAFETY: not null, aligned, apart from what is borrowed; the caller's.
-        unsafe { events.write(filled) };
-        Ok(())
-    };
-    status(see())
+        Ok(filled)
+    })
 }
 
 /// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the
@@ -409,20 +304,10 @@ pub extern "C" fn flexspline_record(
     output: *const FlexsplineOutput,
     record: *mut [u8; FLEXSPLINE_RECORD_BYTES],
 ) -> FlexsplineStatus {
-    let write = || {
-        for read in [span(state), span(store), span(output)] {
-            apart([span(record), read])?;
-        }
-        usable(record)?;
-        let given = given(output)?;
-        let state: &JointState = get(state, Object::State)?;
-        let store: &Store = get(store, Object::Store)?;
-        let made = Record { number, lost, ..Record::of(tick, state, store, &given) };
-        // SAFETY: not null, apart from what is borrowed; the caller owns this length.
-        unsafe { record.write(made.encode()) };
-        Ok(())
-    };
-    status(write())
+    answer(record, [span(state), span(store), span(output)], || {
+        let made = Record::of(tick, state_of(state)?, store_of(store)?, &given(output)?);
+        Ok(Record { number, lost, ..made }.encode())
+    })
 }
 
 /// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not
@@ -432,12 +317,11 @@ pub extern "C" fn flexspline_predictor_init(
     predictor: *mut FlexsplinePredictor,
     parts: *const [f32; FLEXSPLINE_PREDICTOR_PARTS],
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         apart([span(predictor), span(parts)])?;
         let made = TwoMassObserver::from_parts(&copied(parts)?).map_err(|_| FlexsplineStatus::Argument)?;
         put(predictor, Object::Predictor, made)
-    };
-    status(make())
+    })
 }
 
 /// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double
@@ -446,29 +330,21 @@ pub extern "C" fn flexspline_predictor_init(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predictor_of(
     predictor: *mut FlexsplinePredictor,
-    inertias: *const FlexsplineInertias,
+    inertias: *const Inertias,
     noise: *const FlexsplineNoise,
     tick_s: f64,
 ) -> FlexsplineStatus {
-    let make = || {
-        let (i, n) = (copied(inertias)?, copied(noise)?);
-        usable(predictor)?;
-        let inertias = Inertias {
-            motor_kg_m2: i.motor_kg_m2,
-            load_kg_m2: i.load_kg_m2,
-            stiffness_n_m_per_rad: i.stiffness_n_m_per_rad,
-            damping_n_m_s_per_rad: i.damping_n_m_s_per_rad,
-        };
+    status(|| {
+        let n = copied(noise)?;
         let noise = Noise {
             torque_n_m: n.torque_n_m,
             load_change_n_m: n.load_change_n_m,
             speed_rad_s: n.speed_rad_s,
             twist_rad: (n.has_twist != 0).then_some(n.twist_rad),
         };
-        let made = TwoMassObserver::new(inertias, noise, tick_s).map_err(|_| FlexsplineStatus::Argument)?;
+        let made = TwoMassObserver::new(copied(inertias)?, noise, tick_s).map_err(|_| FlexsplineStatus::Argument)?;
         put(predictor, Object::Predictor, made)
-    };
-    status(make())
+    })
 }
 
 /// Reports the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
@@ -477,12 +353,7 @@ pub extern "C" fn flexspline_predictor_parts(
     predictor: *const FlexsplinePredictor,
     parts: *mut [f32; FLEXSPLINE_PREDICTOR_PARTS],
 ) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(predictor), span(parts)])?;
-        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
-        give(parts, predictor.parts())
-    };
-    status(fill())
+    answer(parts, [span(predictor)], || Ok(predictor_of(predictor)?.parts()))
 }
 
 /// Reports the largest error of the observer while the disturbances stay within their bounds: twist rad, speeds of
@@ -491,24 +362,18 @@ pub extern "C" fn flexspline_predictor_parts(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predictor_state_bound(
     predictor: *const FlexsplinePredictor,
-    disturbance: *const FlexsplineDisturbance,
+    disturbance: *const Disturbance,
     bound: *mut [f32; 4],
 ) -> FlexsplineStatus {
-    let fill = || {
-        clear(span(bound), [span(predictor), span(disturbance)])?;
-        usable(bound)?;
-        let FlexsplineDisturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad } = copied(disturbance)?;
-        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
-        let disturbance = Disturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad };
-        give(bound, predictor.state_bound(&disturbance))
-    };
-    status(fill())
+    answer(bound, [span(predictor), span(disturbance)], || {
+        Ok(predictor_of(predictor)?.state_bound(&copied(disturbance)?))
+    })
 }
 
 /// Makes an observer at rest, without load.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_observer_init(observer: *mut FlexsplineObserver) -> FlexsplineStatus {
-    status(put(observer, Object::Observer, PredictorState::new()))
+    status(|| put(observer, Object::Observer, PredictorState::new()))
 }
 
 /// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
@@ -518,20 +383,18 @@ pub extern "C" fn flexspline_observer_init(observer: *mut FlexsplineObserver) ->
 pub extern "C" fn flexspline_observer_step(
     observer: *mut FlexsplineObserver,
     predictor: *const FlexsplinePredictor,
-    measured: *const FlexsplineMeasured,
+    measured: *const Measured,
 ) -> FlexsplineStatus {
-    let step = || {
+    status(|| {
         apart([span(observer), span(predictor)])?;
-        let FlexsplineMeasured { torque_n_m, speed_rad_s, twist_rad } = copied(measured)?;
-        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
+        let measured = copied(measured)?;
+        let predictor = predictor_of(predictor)?;
         let observer: &mut PredictorState = get_mut(observer, Object::Observer)?;
         if observer.is_lost() || predictor.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
-        let used = predictor.step(observer, &Measured { torque_n_m, speed_rad_s, twist_rad });
-        if used { Ok(()) } else { Err(FlexsplineStatus::Argument) }
-    };
-    status(step())
+        if predictor.step(observer, &measured) { Ok(()) } else { Err(FlexsplineStatus::Argument) }
+    })
 }
 
 /// Reports the estimates of an observer.
@@ -540,20 +403,14 @@ pub extern "C" fn flexspline_observer_report(
     observer: *const FlexsplineObserver,
     report: *mut FlexsplineObserverReport,
 ) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(observer), span(report)])?;
-        usable(report)?;
+    answer(report, [span(observer)], || {
         let observer: &PredictorState = get(observer, Object::Observer)?;
-        let filled = FlexsplineObserverReport {
+        Ok(FlexsplineObserverReport {
             twist_rad: observer.twist_rad(),
             load_speed_rad_s: observer.load_speed_rad_s(),
             load_torque_n_m: observer.load_torque_n_m(),
-        };
-        // SAFETY: not null, aligned, apart from the observer; the caller's.
-        unsafe { report.write(filled) };
-        Ok(())
-    };
-    status(fill())
+        })
+    })
 }
 
 /// Predicts the output some ticks from now, with the table as the output map of the two inertias. The work
@@ -568,14 +425,10 @@ pub extern "C" fn flexspline_predict(
     now: *const FlexsplineNow,
     ahead: *mut FlexsplineAhead,
 ) -> FlexsplineStatus {
-    let predict = || {
-        for read in [span(predictor), span(observer), span(joint), span(store), span(state), span(now)] {
-            apart([span(ahead), read])?;
-        }
-        usable(ahead)?;
+    let read = [span(predictor), span(observer), span(joint), span(store), span(state), span(now)];
+    answer(ahead, read, || {
         let from = copied(now)?;
-        let predictor: &TwoMassObserver = get(predictor, Object::Predictor)?;
-        let observer: &PredictorState = get(observer, Object::Observer)?;
+        let (predictor, observer) = (predictor_of(predictor)?, get::<_, PredictorState>(observer, Object::Observer)?);
         if observer.is_lost() || predictor.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
@@ -584,14 +437,9 @@ pub extern "C" fn flexspline_predict(
         if !numbers.iter().chain(&from.state_bound).chain([&bound]).all(|number| number.is_finite()) {
             return Err(FlexsplineStatus::Argument);
         }
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
-        let state: &JointState = get(state, Object::State)?;
-        let off = Disturbance {
-            torque_n_m: from.torque_off_n_m,
-            load_change_n_m: from.load_change_n_m,
-            ..Disturbance::default()
-        };
+        let (joint, store, state) = (joint_of(joint)?, store_of(store)?, state_of(state)?);
+        let (torque_n_m, load_change_n_m) = (from.torque_off_n_m, from.load_change_n_m);
+        let off = Disturbance { torque_n_m, load_change_n_m, ..Disturbance::default() };
         let turned = predictor.ahead(observer, from.torque_n_m, from.ticks, from.state_bound, &off);
         let now = Now {
             generator: GeneratorAngle::from_counts(from.generator_counts),
@@ -600,19 +448,15 @@ pub extern "C" fn flexspline_predict(
             measured_bound_rad: from.measured_bound_rad,
         };
         let found = predictor.output_ahead(joint, store, observer, &turned, &now);
-        let filled = FlexsplineAhead {
+        Ok(FlexsplineAhead {
             output_counts: found.output.counts(),
             bound_rad: found.bound_rad,
             load_rad: turned.load_rad,
             motor_rad: turned.motor_rad,
             twist_rad: turned.twist_rad,
-            quality: quality_code(found.quality),
-        };
-        // SAFETY: not null, aligned, apart from what is borrowed; the caller's.
-        unsafe { ahead.write(filled) };
-        Ok(())
-    };
-    status(predict())
+            quality: found.quality.code(),
+        })
+    })
 }
 
 #[cfg(test)]

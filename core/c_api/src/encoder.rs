@@ -1,11 +1,7 @@
 //! From the register of an encoder to an angle and back; angles in other units; rate groups.
 
-use super::{
-    FlexsplineJoint, FlexsplineState, FlexsplineStatus, Object, apart, copied, get, get_mut, give, put, span, status,
-    usable,
-};
-use core::mem::MaybeUninit;
-use flexspline::{Encoder, EncoderSettings, EncoderState, EncoderWrap, Joint, JointState, OutputAngle};
+use super::*;
+use flexspline::{Encoder, EncoderSettings, EncoderState, EncoderWrap};
 
 /// Eight-byte words of a [`FlexsplineEncoder`].
 pub const FLEXSPLINE_ENCODER_WORDS: usize = 7;
@@ -46,7 +42,7 @@ pub extern "C" fn flexspline_encoder_init(
     encoder: *mut FlexsplineEncoder,
     settings: *const FlexsplineEncoderSettings,
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         let s = copied(settings)?;
         if s.reversed > 1 {
             return Err(FlexsplineStatus::Argument);
@@ -59,8 +55,7 @@ pub extern "C" fn flexspline_encoder_init(
         };
         let made = Encoder::new(settings).map_err(|_| FlexsplineStatus::Argument)?;
         put(encoder, Object::Encoder, Followed { encoder: made, at: EncoderState::NOWHERE })
-    };
-    status(make())
+    })
 }
 
 /// The first reading after a reset: of all angles with this reading the one nearest to `near_counts` (2^-32 turn) is
@@ -71,16 +66,14 @@ pub extern "C" fn flexspline_encoder_start(
     reading: u64,
     near_counts: i64,
 ) -> FlexsplineStatus {
-    let start = || {
-        let followed: &mut Followed = get_mut(encoder, Object::Encoder)?;
-        if !followed.encoder.mend() {
+    status(|| {
+        let Followed { encoder, at } = get_mut(encoder, Object::Encoder)?;
+        if !encoder.mend() {
             return Err(FlexsplineStatus::NotInitialised);
         }
-        let at = followed.encoder.start(reading, near_counts).ok_or(FlexsplineStatus::Argument)?;
-        followed.at = at;
+        *at = encoder.start(reading, near_counts).ok_or(FlexsplineStatus::Argument)?;
         Ok(())
-    };
-    status(start())
+    })
 }
 
 /// Takes a reading of the encoder of a joint's generator and reports the angle to give to its next tick, counts of
@@ -101,20 +94,17 @@ pub extern "C" fn flexspline_joint_read(
     reading: u64,
     angle_counts: *mut i64,
 ) -> FlexsplineStatus {
-    let read = || {
-        apart([span(encoder), span(angle_counts), span(joint), span(state)])?;
-        usable(angle_counts)?;
-        let (joint, state): (&Joint, &JointState) = (get(joint, Object::Joint)?, get(state, Object::State)?);
+    answer(angle_counts, [span(encoder), span(joint), span(state)], || {
+        clear(span(encoder), [span(joint), span(state)])?;
+        let (joint, state) = (joint_of(joint)?, state_of(state)?);
         let Followed { encoder, at } = get_mut(encoder, Object::Encoder)?;
         if !encoder.mend() || at.is_lost() || joint.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
         }
         let angle = joint.read(state, encoder, at, reading);
         let refused = if at.is_lost() { FlexsplineStatus::NotInitialised } else { FlexsplineStatus::Argument };
-        let angle = angle.ok_or(refused)?;
-        give(angle_counts, angle.counts())
-    };
-    status(read())
+        Ok(angle.ok_or(refused)?.counts())
+    })
 }
 
 /// The same for an encoder that no joint judges: one wrong reading, half of what the register counts away, moves it by
@@ -128,9 +118,7 @@ pub extern "C" fn flexspline_encoder_read(
     reading: u64,
     angle_counts: *mut i64,
 ) -> FlexsplineStatus {
-    let read = || {
-        apart([span(encoder), span(angle_counts)])?;
-        usable(angle_counts)?;
+    answer(angle_counts, [span(encoder)], || {
         let Followed { encoder, at } = get_mut(encoder, Object::Encoder)?;
         if !encoder.mend() || at.is_lost() {
             return Err(FlexsplineStatus::NotInitialised);
@@ -138,9 +126,8 @@ pub extern "C" fn flexspline_encoder_read(
         if !encoder.read(at, reading) {
             return Err(FlexsplineStatus::Argument);
         }
-        give(angle_counts, encoder.angle(at).ok_or(FlexsplineStatus::NotInitialised)?)
-    };
-    status(read())
+        encoder.angle(at).ok_or(FlexsplineStatus::NotInitialised)
+    })
 }
 
 /// Register value at an angle, to the nearest count: for a drive that is commanded in counts of its encoder.
@@ -150,26 +137,17 @@ pub extern "C" fn flexspline_encoder_reading(
     angle_counts: i64,
     reading: *mut u64,
 ) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(encoder), span(reading)])?;
-        let followed: &Followed = get(encoder, Object::Encoder)?;
-        if followed.encoder.is_lost() {
-            return Err(FlexsplineStatus::NotInitialised);
-        }
-        give(reading, followed.encoder.reading(angle_counts))
-    };
-    status(fill())
+    answer(reading, [span(encoder)], || {
+        let Followed { encoder, .. } = get(encoder, Object::Encoder)?;
+        if encoder.is_lost() { Err(FlexsplineStatus::NotInitialised) } else { Ok(encoder.reading(angle_counts)) }
+    })
 }
 
 /// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or
 /// beyond 2^31 turns. For start-up and the host: in double precision.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_counts_from_rad(rad: f64, angle_counts: *mut i64) -> FlexsplineStatus {
-    let fill = || {
-        usable(angle_counts)?;
-        give(angle_counts, OutputAngle::from_rad(rad).ok_or(FlexsplineStatus::Argument)?.counts())
-    };
-    status(fill())
+    answer(angle_counts, [], || Ok(OutputAngle::from_rad(rad).ok_or(FlexsplineStatus::Argument)?.counts()))
 }
 
 /// Radians of an angle in counts of 2^-32 turn. For start-up and the host: in double precision.

@@ -1,12 +1,6 @@
 //! Additions to the table: coefficients learnt from measurements of the output, and springs that slip.
 
-use super::{
-    FlexsplineInput, FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object,
-    apart, bytes, bytes_mut, clear, copied, core_input, get, get_mut, give, given, list, put, restore_status, span,
-    status, usable,
-};
-use core::mem::MaybeUninit;
-use flexspline::{Adjustment, Joint, JointState, OutputAngle, Store, TableId};
+use super::*;
 use flexspline_estimation::{
     AdaptRestoreError, AdaptSettings, AdaptState, Coefficient, Learning, LoadTorque, MaxwellSlip, NO_COEFFICIENT,
     NOBODY, OnlineCalibration, Seen, Slip, SlipElement, SlipState, Term, TorqueSlipElement, Verdict, saved_adapt_bytes,
@@ -28,9 +22,9 @@ pub const FLEXSPLINE_SAVED_SLIP_BYTES: usize = 100;
 
 /// Offset of the mean error, rad.
 pub const FLEXSPLINE_TERM_MEAN: u8 = 0;
-/// Wind-up beside that of the table, rad/(N m).
+/// Wind-up in addition to that of the table, rad/(N m).
 pub const FLEXSPLINE_TERM_WIND_UP: u8 = 1;
-/// Half-width of the play beside that of the table, rad.
+/// Half-width of the play in addition to that of the table, rad.
 pub const FLEXSPLINE_TERM_HALF_WIDTH: u8 = 2;
 /// Cosine of `order` periods in a generator turn, rad.
 pub const FLEXSPLINE_TERM_COSINE: u8 = 3;
@@ -58,7 +52,7 @@ pub const FLEXSPLINE_VERDICT_UNSETTLED: u8 = 4;
 pub const FLEXSPLINE_VERDICT_UNEXCITED: u8 = 5;
 /// The tick itself was not to be trusted.
 pub const FLEXSPLINE_VERDICT_UNTRUSTED: u8 = 6;
-/// What was learnt, or the settings, are lost to an upset: nothing is added, and the uncertainty is all that can have
+/// Learnt coefficients or settings are lost to an upset: nothing is added, and the uncertainty is all that can have
 /// been added. Until `flexspline_learner_set`, or until the learner is made anew.
 pub const FLEXSPLINE_VERDICT_LOST: u8 = 7;
 
@@ -70,7 +64,7 @@ pub const FLEXSPLINE_SLIP_OF_OUTPUT: u8 = 0;
 /// Springs that slip with the load torque: widths in N m, 0 to 10000, gains in rad/(N m).
 pub const FLEXSPLINE_SLIP_OF_TORQUE: u8 = 1;
 
-/// What is added to the table in the next tick, and how far it is known, under a sum: an upset of one word is mended.
+/// Addition to the table in the next tick, and how far it is known, under a sum: an upset of one word is mended.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineAdjustment {
@@ -116,8 +110,8 @@ pub struct FlexsplineLearnSettings {
     pub memory_measurements: f32,
     /// Standard deviations beyond which an innovation is an outlier: 1 to 100.
     pub gate: f32,
-    /// Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to
-    /// 0.049.
+    /// Way at the output after a reversal that is left out in addition to four times the limit of the half-width,
+    /// rad; 0 to 0.049.
     pub settle_rad: f32,
     /// Torque beyond which the wind-up's share grows no more, N m.
     pub torque_limit_n_m: f32,
@@ -200,11 +194,6 @@ pub struct FlexsplineSlipReport {
     pub is_known: u8,
 }
 
-const LEARNING: [(u8, Learning); 3] = [
-    (FLEXSPLINE_LEARNING_OFF, Learning::Off),
-    (FLEXSPLINE_LEARNING_FROZEN, Learning::Frozen),
-    (FLEXSPLINE_LEARNING_ON, Learning::On),
-];
 const MOST: usize = FLEXSPLINE_LEARNER_COEFFICIENTS;
 const SPRINGS: usize = FLEXSPLINE_SLIP_SPRINGS;
 
@@ -233,6 +222,13 @@ struct CSprings {
 const _: () = {
     assert!(FLEXSPLINE_SAVED_LEARNER_BYTES == saved_adapt_bytes(MOST));
     assert!(FLEXSPLINE_SAVED_SLIP_BYTES == saved_slip_bytes(SPRINGS));
+    assert!(FLEXSPLINE_LEARNING_FROZEN == Learning::Frozen as u8 && FLEXSPLINE_LEARNING_ON == Learning::On as u8);
+    assert!(FLEXSPLINE_VERDICT_USED == Verdict::Used as u8 && FLEXSPLINE_VERDICT_QUIET == Verdict::Quiet as u8);
+    assert!(FLEXSPLINE_VERDICT_OUTLIER == Verdict::Outlier as u8);
+    assert!(FLEXSPLINE_VERDICT_UNSETTLED == Verdict::Unsettled as u8);
+    assert!(FLEXSPLINE_VERDICT_UNEXCITED == Verdict::Unexcited as u8);
+    assert!(FLEXSPLINE_VERDICT_UNTRUSTED == Verdict::Untrusted as u8);
+    assert!(FLEXSPLINE_VERDICT_LOST == Verdict::Lost as u8);
 };
 
 fn coefficient(c: FlexsplineCoefficient) -> Result<Coefficient, FlexsplineStatus> {
@@ -256,7 +252,7 @@ pub extern "C" fn flexspline_learner_init(
     coefficients: *const FlexsplineCoefficient,
     number: u8,
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         let s = copied(settings)?;
         let none = FlexsplineCoefficient { limit: 0.0, initial_std: 0.0, term: 0, order: 0 };
         let wanted = list(coefficients, number, [none; MOST])?;
@@ -275,21 +271,22 @@ pub extern "C" fn flexspline_learner_init(
         let adapter =
             OnlineCalibration::of_first(&settings, number as usize).map_err(|_| FlexsplineStatus::Argument)?;
         put(learner, Object::Learner, Learner { adapter, state: adapter.start(), used: number })
-    };
-    status(make())
+    })
 }
 
 /// Switches learning (`FLEXSPLINE_LEARNING_...`), from the next update on.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learning: u8) -> FlexsplineStatus {
-    let set = || {
+    status(|| {
         let learner: &mut Learner = get_mut(learner, Object::Learner)?;
-        let found = LEARNING.into_iter().find(|(code, _)| *code == learning);
-        let (_, learning) = found.ok_or(FlexsplineStatus::Argument)?;
-        learner.state.set_learning(learning);
+        learner.state.set_learning(match learning {
+            FLEXSPLINE_LEARNING_OFF => Learning::Off,
+            FLEXSPLINE_LEARNING_FROZEN => Learning::Frozen,
+            FLEXSPLINE_LEARNING_ON => Learning::On,
+            _ => return Err(FlexsplineStatus::Argument),
+        });
         Ok(())
-    };
-    status(set())
+    })
 }
 
 /// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored
@@ -304,12 +301,9 @@ pub extern "C" fn flexspline_learner_bind(
     store: *const FlexsplineStore,
     unit: u32,
 ) -> FlexsplineStatus {
-    let bind = || {
-        for object in [span(joint), span(store)] {
-            apart([span(learner), object])?;
-        }
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
+    status(|| {
+        clear(span(learner), [span(joint), span(store)])?;
+        let (joint, store) = (joint_of(joint)?, store_of(store)?);
         let Learner { adapter, state, .. } = get_mut(learner, Object::Learner)?;
         if store.id() == TableId::default() {
             return Err(FlexsplineStatus::Argument);
@@ -320,26 +314,24 @@ pub extern "C" fn flexspline_learner_bind(
             adapter.reset(state);
         }
         Ok(())
-    };
-    status(bind())
+    })
 }
 
 /// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment
 /// out.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_reset(learner: *mut FlexsplineLearner) -> FlexsplineStatus {
-    let reset = || {
+    status(|| {
         let Learner { adapter, state, .. } = get_mut(learner, Object::Learner)?;
         adapter.reset(state);
         Ok(())
-    };
-    status(reset())
+    })
 }
 
 /// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output
 /// angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and reports
 /// the addition in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
-/// with the learner's own adjustment alone: what springs or a model of yours added beside it counts as known then, and
+/// with the learner's own adjustment alone: what springs or a model of yours added to it counts as known then, and
 /// is not learnt a second time.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_update(
@@ -351,38 +343,21 @@ pub extern "C" fn flexspline_learner_update(
     measured_counts: i64,
     adapted: *mut FlexsplineAdapted,
 ) -> FlexsplineStatus {
-    let update = || {
-        for written in [span(learner), span(adapted)] {
-            clear(written, [span(state), span(input), span(output)])?;
-        }
-        apart([span(learner), span(adapted)])?;
-        usable(adapted)?;
+    answer(adapted, [span(learner), span(state), span(input), span(output)], || {
+        clear(span(learner), [span(state), span(input), span(output)])?;
         let (input, output) = (core_input(&copied(input)?), given(output)?);
-        let state: &JointState = get(state, Object::State)?;
+        let play = state_of(state)?.play();
         let learner: &mut Learner = get_mut(learner, Object::Learner)?;
         let measured = (has_measured != 0).then_some(OutputAngle::from_counts(measured_counts));
-        let seen = Seen { input: &input, play: state.play(), output: &output, measured };
-        let found = learner.adapter.update(&mut learner.state, &seen);
-        give(
-            adapted,
-            FlexsplineAdapted {
-                mean_counts: found.adjustment.mean_counts(),
-                half_width_counts: found.adjustment.half_width_counts(),
-                uncertainty_rad: found.uncertainty_rad,
-                verdict: match found.verdict {
-                    Verdict::Idle => FLEXSPLINE_VERDICT_IDLE,
-                    Verdict::Used => FLEXSPLINE_VERDICT_USED,
-                    Verdict::Quiet => FLEXSPLINE_VERDICT_QUIET,
-                    Verdict::Outlier => FLEXSPLINE_VERDICT_OUTLIER,
-                    Verdict::Unsettled => FLEXSPLINE_VERDICT_UNSETTLED,
-                    Verdict::Unexcited => FLEXSPLINE_VERDICT_UNEXCITED,
-                    Verdict::Untrusted => FLEXSPLINE_VERDICT_UNTRUSTED,
-                    Verdict::Lost => FLEXSPLINE_VERDICT_LOST,
-                },
-            },
-        )
-    };
-    status(update())
+        let found =
+            learner.adapter.update(&mut learner.state, &Seen { input: &input, play, output: &output, measured });
+        Ok(FlexsplineAdapted {
+            mean_counts: found.adjustment.mean_counts(),
+            half_width_counts: found.adjustment.half_width_counts(),
+            uncertainty_rad: found.uncertainty_rad,
+            verdict: found.verdict as u8,
+        })
+    })
 }
 
 /// Reports a coefficient, by its index in the list that the learner was made of; `FLEXSPLINE_STATUS_ARGUMENT` beyond
@@ -393,15 +368,13 @@ pub extern "C" fn flexspline_learner_coefficient(
     place: u8,
     learnt: *mut FlexsplineLearnt,
 ) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(learner), span(learnt)])?;
+    answer(learnt, [span(learner)], || {
         let learner: &Learner = get(learner, Object::Learner)?;
         let found = learner.adapter.coefficients(&learner.state);
         let known = found.iter().take(learner.used as usize).nth(place as usize);
         let &(value, std) = known.ok_or(FlexsplineStatus::Argument)?;
-        give(learnt, FlexsplineLearnt { value, std })
-    };
-    status(fill())
+        Ok(FlexsplineLearnt { value, std })
+    })
 }
 
 /// Reports the counts of measurements by verdict.
@@ -410,29 +383,23 @@ pub extern "C" fn flexspline_learner_report(
     learner: *const FlexsplineLearner,
     report: *mut FlexsplineLearnerReport,
 ) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(learner), span(report)])?;
+    answer(report, [span(learner)], || {
         let learner: &Learner = get(learner, Object::Learner)?;
-        let (counters, now) = (learner.state.counters(), learner.state.learning());
-        let learning = LEARNING.into_iter().find(|(_, learning)| *learning == now).map_or(0, |(code, _)| code);
-        give(
-            report,
-            FlexsplineLearnerReport {
-                used: counters.used,
-                quiet: counters.quiet,
-                outliers: counters.outliers,
-                outliers_in_a_row: counters.outliers_in_a_row,
-                unsettled: counters.unsettled,
-                unexcited: counters.unexcited,
-                untrusted: counters.untrusted,
-                limited: counters.limited,
-                restarts: counters.restarts,
-                learning,
-                coefficients: learner.used,
-            },
-        )
-    };
-    status(fill())
+        let counters = learner.state.counters();
+        Ok(FlexsplineLearnerReport {
+            used: counters.used,
+            quiet: counters.quiet,
+            outliers: counters.outliers,
+            outliers_in_a_row: counters.outliers_in_a_row,
+            unsettled: counters.unsettled,
+            unexcited: counters.unexcited,
+            untrusted: counters.untrusted,
+            limited: counters.limited,
+            restarts: counters.restarts,
+            learning: learner.state.learning() as u8,
+            coefficients: learner.used,
+        })
+    })
 }
 
 /// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most.
@@ -444,16 +411,13 @@ pub extern "C" fn flexspline_learner_save(
     saved_bytes: usize,
     written: *mut usize,
 ) -> FlexsplineStatus {
-    let save = || {
-        usable(written)?;
-        let room = (saved as usize, saved_bytes);
-        apart([span(learner), room, span(written)])?;
+    answer(written, [span(learner), (saved as usize, saved_bytes)], || {
+        apart([span(learner), (saved as usize, saved_bytes)])?;
         let learner: &Learner = get(learner, Object::Learner)?;
         let room = bytes_mut(saved, saved_bytes)?;
         let took = learner.adapter.save_first(&learner.state, learner.used as usize, room);
-        give(written, took.ok_or(FlexsplineStatus::TooLarge)?)
-    };
-    status(save())
+        took.ok_or(FlexsplineStatus::TooLarge)
+    })
 }
 
 /// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off.
@@ -466,7 +430,7 @@ pub extern "C" fn flexspline_learner_restore(
     saved: *const u8,
     saved_bytes: usize,
 ) -> FlexsplineStatus {
-    let restore = || {
+    status(|| {
         apart([span(learner), (saved as usize, saved_bytes)])?;
         let kept = bytes(saved, saved_bytes)?;
         let learner: &mut Learner = get_mut(learner, Object::Learner)?;
@@ -477,8 +441,7 @@ pub extern "C" fn flexspline_learner_restore(
             _ => FlexsplineStatus::Saved,
         })?;
         Ok(())
-    };
-    status(restore())
+    })
 }
 
 /// Makes 1 to `FLEXSPLINE_SLIP_SPRINGS` springs that slip with `variable` (`FLEXSPLINE_SLIP_OF_...`), no deflection of
@@ -490,7 +453,7 @@ pub extern "C" fn flexspline_slip_init(
     springs: *const FlexsplineSpring,
     number: u8,
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         let springs = list(springs, number, [FlexsplineSpring::default(); SPRINGS])?;
         let bank = match variable {
             FLEXSPLINE_SLIP_OF_OUTPUT => {
@@ -505,15 +468,14 @@ pub extern "C" fn flexspline_slip_init(
             _ => None,
         };
         put(slip, Object::Slip, CSprings { bank: bank.ok_or(FlexsplineStatus::Argument)?, used: number })
-    };
-    status(make())
+    })
 }
 
 /// Sets all deflections anew: 0, not known, as after a reset; 1, none, as before the first motion or after strokes that
 /// died away.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_set(slip: *mut FlexsplineSlip, is_relaxed: u8) -> FlexsplineStatus {
-    let set = || {
+    status(|| {
         let CSprings { bank, .. } = get_mut(slip, Object::Slip)?;
         if is_relaxed > 1 {
             return Err(FlexsplineStatus::Argument);
@@ -527,8 +489,7 @@ pub extern "C" fn flexspline_slip_set(slip: *mut FlexsplineSlip, is_relaxed: u8)
             }
         }
         Ok(())
-    };
-    status(set())
+    })
 }
 
 /// One tick of springs: what they add, and whether every deflection is known.
@@ -537,16 +498,13 @@ fn slip_tick(
     report: *mut FlexsplineSlipReport,
     follow: impl FnOnce(&mut Bank) -> Result<(Slip, bool), FlexsplineStatus>,
 ) -> FlexsplineStatus {
-    let tick = || {
-        apart([span(slip), span(report)])?;
-        usable(report)?;
+    answer(report, [span(slip)], || {
         let CSprings { bank, .. } = get_mut(slip, Object::Slip)?;
         let (found, is_known) = follow(bank)?;
         let Slip { error_rad, uncertainty_rad } = found;
         let (mean_counts, is_known) = (found.mean_counts(), is_known as u8);
-        give(report, FlexsplineSlipReport { error_rad, uncertainty_rad, mean_counts, is_known })
-    };
-    status(tick())
+        Ok(FlexsplineSlipReport { error_rad, uncertainty_rad, mean_counts, is_known })
+    })
 }
 
 /// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they
@@ -596,27 +554,24 @@ pub extern "C" fn flexspline_slip_save(
     saved_bytes: usize,
     written: *mut usize,
 ) -> FlexsplineStatus {
-    status(save_slip(slip, NOBODY, saved, saved_bytes, written))
+    answer(written, [span(slip), (saved as usize, saved_bytes)], || save_slip(slip, NOBODY, saved, saved_bytes))
 }
 
-/// Springs as bytes, that belong to somebody or nobody.
+/// Springs as bytes, that belong to somebody or nobody; the number of bytes.
 pub(super) fn save_slip(
     slip: *const FlexsplineSlip,
     owner: [u32; 4],
     saved: *mut u8,
     saved_bytes: usize,
-    written: *mut usize,
-) -> Result<(), FlexsplineStatus> {
-    usable(written)?;
-    apart([span(slip), (saved as usize, saved_bytes), span(written)])?;
+) -> Result<usize, FlexsplineStatus> {
+    apart([span(slip), (saved as usize, saved_bytes)])?;
     let &CSprings { ref bank, used } = get(slip, Object::Slip)?;
     let (room, used) = (bytes_mut(saved, saved_bytes)?, used as usize);
     let (took, is_lost) = match bank {
         Bank::Output(bank, state) => (bank.save_first(state, owner, used, room), bank.is_lost() || state.is_lost()),
         Bank::Torque(bank, state) => (bank.save_first(state, owner, used, room), bank.is_lost() || state.is_lost()),
     };
-    let refused = if is_lost { FlexsplineStatus::NotInitialised } else { FlexsplineStatus::TooLarge };
-    give(written, took.ok_or(refused)?)
+    took.ok_or(if is_lost { FlexsplineStatus::NotInitialised } else { FlexsplineStatus::TooLarge })
 }
 
 /// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load)
@@ -629,11 +584,12 @@ pub extern "C" fn flexspline_slip_restore(
     saved_bytes: usize,
 ) -> FlexsplineStatus {
     // Of whom they are is not asked, so it is not said either.
-    let not_whose = |error| match error {
-        FlexsplineStatus::OtherTable | FlexsplineStatus::OtherJoint => FlexsplineStatus::Saved,
-        error => error,
-    };
-    status(restore_slip(slip, NOBODY, saved, saved_bytes).map_err(not_whose))
+    status(|| {
+        restore_slip(slip, NOBODY, saved, saved_bytes).map_err(|error| match error {
+            FlexsplineStatus::OtherTable | FlexsplineStatus::OtherJoint => FlexsplineStatus::Saved,
+            error => error,
+        })
+    })
 }
 
 /// Springs of bytes that belong to somebody or nobody.
@@ -657,7 +613,7 @@ pub(super) fn restore_slip(
 /// Makes an adjustment that adds nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_adjustment_init(adjustment: *mut FlexsplineAdjustment) -> FlexsplineStatus {
-    status(put(adjustment, Object::Adjustment, Adjustment::default()))
+    status(|| put(adjustment, Object::Adjustment, Adjustment::default()))
 }
 
 /// Adds to an adjustment, counts of 2^-32 turn at the output, each sum held within +-0.049 rad; and to its uncertainty,
@@ -670,13 +626,12 @@ pub extern "C" fn flexspline_adjustment_add(
     half_width_counts: i32,
     uncertainty_rad: f32,
 ) -> FlexsplineStatus {
-    let add = || {
+    status(|| {
         let adjustment: &mut Adjustment = get_mut(adjustment, Object::Adjustment)?;
         let added = Adjustment::new(mean_counts, half_width_counts);
         *adjustment = adjustment.plus(added).with_uncertainty(uncertainty_rad);
         Ok(())
-    };
-    status(add())
+    })
 }
 
 /// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model
@@ -688,13 +643,12 @@ pub extern "C" fn flexspline_input_add(
     mean_counts: i32,
     half_width_counts: i32,
 ) -> FlexsplineStatus {
-    let add = || {
+    status(|| {
         let before = copied(input)?;
         let sum = core_input(&before).adjustment.plus(Adjustment::new(mean_counts, half_width_counts));
         let (mean_counts, half_width_counts) = (sum.mean_counts(), sum.half_width_counts());
         give(input, FlexsplineInput { mean_counts, half_width_counts, ..before })
-    };
-    status(add())
+    })
 }
 
 /// The same in radians at the output; NaN adds nothing.

@@ -47,13 +47,13 @@ mod torque;
 
 pub use {ask::*, beside::*, encoder::*, learn::*, names::*, safe::*, telemetry::*, torque::*};
 
-use beside::{given, health_code, quality_code};
 use core::mem::{MaybeUninit, align_of, size_of};
 use flexspline::{
-    ActivateError, Activation, Adjustment, Counters, Drive, FixedMember, Flags, GeneratorAngle, Identity,
-    IdentityCheck, ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, Progress,
-    RestoreError, Store, self_test,
+    ActivateError, Activation, Adjustment, Approach, Counters, Direction, Drive, FixedMember, Flags, GeneratorAngle,
+    Health, Identity, IdentityCheck, ImageError, Images, Input, Joint, JointState, Limits, Mode, Output, OutputAngle,
+    Overrun, PlayState, Progress, Quality, RestoreError, Store, Table, TableId, self_test,
 };
+use torque::direction_of;
 
 #[cfg(all(target_os = "none", not(test)))]
 use panic_never as _;
@@ -499,8 +499,37 @@ fn clear<const N: usize>(written: (usize, usize), read: [(usize, usize); N]) -> 
     read.into_iter().try_for_each(|read| apart([written, read]))
 }
 
-fn status(result: Result<(), FlexsplineStatus>) -> FlexsplineStatus {
-    result.err().unwrap_or(FlexsplineStatus::Ok)
+/// A call that changes objects.
+#[inline(always)]
+fn status(call: impl FnOnce() -> Result<(), FlexsplineStatus>) -> FlexsplineStatus {
+    call().err().unwrap_or(FlexsplineStatus::Ok)
+}
+
+/// A call that gives an answer, written only if there is one. `others` are the objects that `ask` borrows: the place of
+/// the answer must be apart from all of them.
+#[inline(always)]
+fn answer<T, const N: usize>(
+    to: *mut T,
+    others: [(usize, usize); N],
+    ask: impl FnOnce() -> Result<T, FlexsplineStatus>,
+) -> FlexsplineStatus {
+    status(|| {
+        usable(to)?;
+        clear(span(to), others)?;
+        give(to, ask()?)
+    })
+}
+
+fn joint_of<'a>(joint: *const FlexsplineJoint) -> Result<&'a Joint, FlexsplineStatus> {
+    get(joint, Object::Joint)
+}
+
+fn store_of<'a>(store: *const FlexsplineStore) -> Result<&'a Store, FlexsplineStatus> {
+    get(store, Object::Store)
+}
+
+fn state_of<'a>(state: *const FlexsplineState) -> Result<&'a JointState, FlexsplineStatus> {
+    get(state, Object::State)
 }
 
 /// Why an image is refused, as far as a caller can act on it.
@@ -518,7 +547,7 @@ fn span<T>(pointer: *const T) -> (usize, usize) {
 /// Makes an empty store, where it lies: nothing of its size is on the stack.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_init(store: *mut FlexsplineStore) -> FlexsplineStatus {
-    let init = || {
+    status(|| {
         const { assert!(fits::<FlexsplineStore, Store>()) };
         usable(store)?;
         let marked = store.cast::<Marked<Store>>();
@@ -530,8 +559,7 @@ pub extern "C" fn flexspline_store_init(store: *mut FlexsplineStore) -> Flexspli
         };
         marked.mark = spread(Object::Store);
         Ok(())
-    };
-    status(init())
+    })
 }
 
 /// Makes a joint of its settings.
@@ -540,7 +568,7 @@ pub extern "C" fn flexspline_joint_init(
     joint: *mut FlexsplineJoint,
     settings: *const FlexsplineSettings,
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         let s = copied(settings)?;
         let fixed = match s.fixed_member {
             FLEXSPLINE_FIXED_FLEXSPLINE => FixedMember::Flexspline,
@@ -564,8 +592,7 @@ pub extern "C" fn flexspline_joint_init(
         let argument = FlexsplineStatus::Argument;
         let drive = Drive::new(s.flexspline_teeth, s.circular_spline_teeth, fixed).map_err(|_| argument)?;
         put(joint, Object::Joint, Joint::new(drive, limits, overrun).map_err(|_| argument)?)
-    };
-    status(make())
+    })
 }
 
 /// Limits the acceleration of a joint's generator, rad/s^2: a sample that would need more is a glitch, and one that is
@@ -575,18 +602,17 @@ pub extern "C" fn flexspline_joint_init(
 /// finite or too small to matter in a tick.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_limit_acceleration(joint: *mut FlexsplineJoint, rad_s2: f32) -> FlexsplineStatus {
-    let limit = || {
+    status(|| {
         let joint: &mut Joint = get_mut(joint, Object::Joint)?;
         *joint = joint.with_generator_acceleration(rad_s2).map_err(|_| FlexsplineStatus::Argument)?;
         Ok(())
-    };
-    status(limit())
+    })
 }
 
 /// Makes the state of a joint after a reset.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_init(state: *mut FlexsplineState) -> FlexsplineStatus {
-    status(put(state, Object::State, JointState::new()))
+    status(|| put(state, Object::State, JointState::new()))
 }
 
 /// Checks the images and fills the store from them, between two ticks. If it fails the table in use stays.
@@ -597,14 +623,13 @@ pub extern "C" fn flexspline_store_activate(
     table: *const FlexsplineImages,
     temperature_c: f32,
 ) -> FlexsplineStatus {
-    let activate = || {
+    status(|| {
         apart([span(store), span(joint)])?;
         let images = images(table, [span(store)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
+        let joint = joint_of(joint)?;
         let store: &mut Store = get_mut(store, Object::Store)?;
         store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(activate_status)
-    };
-    status(activate())
+    })
 }
 
 /// Why a table is not activated.
@@ -627,13 +652,11 @@ pub extern "C" fn flexspline_activation_begin(
     joint: *const FlexsplineJoint,
     temperature_c: f32,
 ) -> FlexsplineStatus {
-    let begin = || {
+    status(|| {
         apart([span(activation), span(joint)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let begun = Store::begin(joint.drive(), temperature_c).map_err(activate_status)?;
+        let begun = Store::begin(joint_of(joint)?.drive(), temperature_c).map_err(activate_status)?;
         put(activation, Object::Activation, begun)
-    };
-    status(begin())
+    })
 }
 
 /// A step: the same store and images with each, until `progress` (`FLEXSPLINE_PROGRESS_...`) is done. If a step fails
@@ -645,26 +668,23 @@ pub extern "C" fn flexspline_activation_step(
     table: *const FlexsplineImages,
     progress: *mut u8,
 ) -> FlexsplineStatus {
-    let step = || {
-        apart([span(activation), span(store), span(progress)])?;
-        usable(progress)?;
+    answer(progress, [span(activation), span(store)], || {
+        apart([span(activation), span(store)])?;
         let images = images(table, [span(activation), span(store), span(progress)])?;
         let activation: &mut Activation = get_mut(activation, Object::Activation)?;
         let store: &mut Store = get_mut(store, Object::Store)?;
-        let code = match activation.step(store, &images).map_err(activate_status)? {
+        Ok(match activation.step(store, &images).map_err(activate_status)? {
             Progress::Checking => FLEXSPLINE_PROGRESS_CHECKING,
             Progress::Filling => FLEXSPLINE_PROGRESS_FILLING,
             Progress::Done(_) => FLEXSPLINE_PROGRESS_DONE,
-        };
-        give(progress, code)
-    };
-    status(step())
+        })
+    })
 }
 
 /// Begins to find out whether an image is the one of its id.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_identity_begin(identity: *mut FlexsplineIdentity) -> FlexsplineStatus {
-    status(put(identity, Object::Identity, IdentityCheck::new()))
+    status(|| put(identity, Object::Identity, IdentityCheck::new()))
 }
 
 /// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is
@@ -676,25 +696,22 @@ pub extern "C" fn flexspline_identity_step(
     image_bytes: usize,
     found: *mut u8,
 ) -> FlexsplineStatus {
-    let step = || {
-        apart([span(identity), span(found), (image as usize, image_bytes)])?;
-        usable(found)?;
+    answer(found, [span(identity), (image as usize, image_bytes)], || {
+        apart([span(identity), (image as usize, image_bytes)])?;
         let image = bytes(image, image_bytes)?;
         let identity: &mut IdentityCheck = get_mut(identity, Object::Identity)?;
-        let code = match identity.step(image) {
+        Ok(match identity.step(image) {
             Identity::Hashing => FLEXSPLINE_IDENTITY_HASHING,
             Identity::Same(_) => FLEXSPLINE_IDENTITY_SAME,
             Identity::Other(_) => FLEXSPLINE_IDENTITY_OTHER,
-        };
-        give(found, code)
-    };
-    status(step())
+        })
+    })
 }
 
 /// Known answers of what a tick is made of, for a slow rate group: `FLEXSPLINE_STATUS_SELF_TEST` if one is another.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_self_test() -> FlexsplineStatus {
-    status(self_test().map_err(|_| FlexsplineStatus::SelfTest))
+    status(|| self_test().map_err(|_| FlexsplineStatus::SelfTest))
 }
 
 /// Sets the temperature, degrees C: in a slow rate group.
@@ -704,12 +721,11 @@ pub extern "C" fn flexspline_store_set_temperature(
     table: *const FlexsplineImages,
     temperature_c: f32,
 ) -> FlexsplineStatus {
-    let set = || {
+    status(|| {
         let images = images(table, [span(store)])?;
         let store: &mut Store = get_mut(store, Object::Store)?;
         if store.set_temperature(&images, temperature_c) { Ok(()) } else { Err(FlexsplineStatus::Argument) }
-    };
-    status(set())
+    })
 }
 
 /// Checks the given number of words of the images: in a slow rate group.
@@ -719,13 +735,12 @@ pub extern "C" fn flexspline_store_check_images(
     table: *const FlexsplineImages,
     words: u16,
 ) -> FlexsplineStatus {
-    let check = || {
+    status(|| {
         let images = images(table, [span(store)])?;
         let store: &mut Store = get_mut(store, Object::Store)?;
         store.check_images(&images, words as usize);
         Ok(())
-    };
-    status(check())
+    })
 }
 
 /// Writes the report on a store.
@@ -734,25 +749,22 @@ pub extern "C" fn flexspline_store_report(
     store: *const FlexsplineStore,
     report: *mut FlexsplineStoreReport,
 ) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(store), span(report)])?;
-        let store: &Store = get(store, Object::Store)?;
+    answer(report, [span(store)], || {
+        let store = store_of(store)?;
         let Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes } = store.counters();
         let (image, page) = store.damaged_page().unwrap_or((255, 0));
-        let filled = FlexsplineStoreReport {
+        Ok(FlexsplineStoreReport {
             table_id: store.id().0,
             doubtful_ticks,
             words_mended,
             words_skipped,
             pages_damaged,
             passes,
-            health: health_code(store.health()),
+            health: store.health().code(),
             damaged_image: image as u8,
             damaged_page: page as u8,
-        };
-        give(report, filled)
-    };
-    status(fill())
+        })
+    })
 }
 
 /// Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and
@@ -766,57 +778,49 @@ pub extern "C" fn flexspline_store_mend_page(
     image: u8,
     page: u8,
 ) -> FlexsplineStatus {
-    let mend = || {
-        usable(damaged)?;
-        let good_bytes = bytes(good, length)?;
+    status(|| {
         apart([span(store), (damaged as usize, length), (good as usize, length)])?;
         let store: &mut Store = get_mut(store, Object::Store)?;
-        // SAFETY: not null, apart from the other image and the store; the caller guarantees this length, and
-        // they are its own.
-        let damaged = unsafe { core::slice::from_raw_parts_mut(damaged, length) };
-        if image > 1 || !Images::mend_page(damaged, good_bytes, page as usize) {
+        let (damaged, good) = (bytes_mut(damaged, length)?, bytes(good, length)?);
+        if image > 1 || !Images::mend_page(damaged, good, page as usize) {
             return Err(FlexsplineStatus::Argument);
         }
         store.mended(image as usize, page as usize);
         Ok(())
-    };
-    status(mend())
+    })
 }
 
 /// Makes a copy of a joint's settings that is not whole anew from the other; `FLEXSPLINE_STATUS_ARGUMENT` if neither
 /// is. In a slow rate group.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_mend(joint: *mut FlexsplineJoint) -> FlexsplineStatus {
-    let mend = || {
+    status(|| {
         let joint: &mut Joint = get_mut(joint, Object::Joint)?;
         if joint.mend() { Ok(()) } else { Err(FlexsplineStatus::Argument) }
-    };
-    status(mend())
+    })
 }
 
 /// Changes the mode (`FLEXSPLINE_MODE_...`): `FLEXSPLINE_STATUS_MODE` where there is no such transition
 /// (`flexspline_mode_may_become`).
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_request(state: *mut FlexsplineState, mode: u8) -> FlexsplineStatus {
-    let request = || {
+    status(|| {
         let state: &mut JointState = get_mut(state, Object::State)?;
         if mode > FLEXSPLINE_MODE_SAFE {
             return Err(FlexsplineStatus::Argument);
         }
         state.request(Mode::from_code(mode as u32)).map_err(|_| FlexsplineStatus::Mode)
-    };
-    status(request())
+    })
 }
 
 /// On command: which side of the play the drive rests on is not known any more, as after work on it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_forget_side(state: *mut FlexsplineState) -> FlexsplineStatus {
-    let forget = || {
+    status(|| {
         let state: &mut JointState = get_mut(state, Object::State)?;
         state.forget_side();
         Ok(())
-    };
-    status(forget())
+    })
 }
 
 /// Writes the report on a state, as the last tick left it.
@@ -825,17 +829,14 @@ pub extern "C" fn flexspline_state_report(
     state: *const FlexsplineState,
     report: *mut FlexsplineStateReport,
 ) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(state), span(report)])?;
-        let state: &JointState = get(state, Object::State)?;
-        let filled = FlexsplineStateReport {
+    answer(report, [span(state)], || {
+        let state = state_of(state)?;
+        Ok(FlexsplineStateReport {
             missed_ticks: state.missed_ticks(),
             mode: state.mode().code() as u8,
             side_known: state.play().is_known() as u8,
-        };
-        give(report, filled)
-    };
-    status(fill())
+        })
+    })
 }
 
 /// Writes what must survive a reset: `FLEXSPLINE_SAVED_BYTES` bytes, with version, table and joint.
@@ -846,16 +847,9 @@ pub extern "C" fn flexspline_state_save(
     store: *const FlexsplineStore,
     saved: *mut [u8; FLEXSPLINE_SAVED_BYTES],
 ) -> FlexsplineStatus {
-    let save = || {
-        for object in [span(state), span(joint), span(store)] {
-            apart([object, span(saved)])?;
-        }
-        let state: &JointState = get(state, Object::State)?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
-        give(saved, state.save(joint, store))
-    };
-    status(save())
+    answer(saved, [span(state), span(joint), span(store)], || {
+        Ok(state_of(state)?.save(joint_of(joint)?, store_of(store)?))
+    })
 }
 
 /// Makes a state of bytes that the same joint saved with the same table, in mode off; only if the joint cannot have
@@ -867,16 +861,11 @@ pub extern "C" fn flexspline_state_restore(
     store: *const FlexsplineStore,
     saved: *const [u8; FLEXSPLINE_SAVED_BYTES],
 ) -> FlexsplineStatus {
-    let restore = || {
-        for object in [span(joint), span(store), span(saved)] {
-            apart([span(state), object])?;
-        }
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
-        let restored = JointState::restore(&copied(saved)?, joint, store).map_err(restore_status)?;
-        put(state, Object::State, restored)
-    };
-    status(restore())
+    status(|| {
+        clear(span(state), [span(joint), span(store), span(saved)])?;
+        let restored = JointState::restore(&copied(saved)?, joint_of(joint)?, store_of(store)?);
+        put(state, Object::State, restored.map_err(restore_status)?)
+    })
 }
 
 /// Why saved bytes are not restored.
@@ -943,7 +932,7 @@ fn tick(
     adjustment: Option<*const FlexsplineAdjustment>,
     output: *mut FlexsplineOutput,
 ) -> FlexsplineStatus {
-    let tick = || {
+    status(|| {
         apart([span(joint), span(store), span(state), span(output)])?;
         usable(output)?;
         let images = images(table, [span(store), span(state), span(output)])?;
@@ -951,7 +940,7 @@ fn tick(
             clear(span(own), [span(store), span(state), span(output)])?;
         }
         let input = copied(input)?;
-        let joint: &Joint = get(joint, Object::Joint)?;
+        let joint = joint_of(joint)?;
         let store: &mut Store = get_mut(store, Object::Store)?;
         let state: &mut JointState = get_mut(state, Object::State)?;
         let mut input = core_input(&input);
@@ -960,19 +949,18 @@ fn tick(
             input.adjustment = input.adjustment.plus(*own);
         }
         let found = joint.tick(&images, store, state, &input);
-        let given = FlexsplineOutput {
+        let filled = FlexsplineOutput {
             command_counts: found.command.counts(),
             output_counts: found.output.counts(),
             transmission_error_rad: found.transmission_error_rad,
             uncertainty_rad: found.uncertainty_rad,
             correction_rad: found.correction_rad,
             held_back_rad: found.held_back_rad,
-            quality: quality_code(found.quality),
+            quality: found.quality.code(),
             flags: Flags::bits(found.flags),
         };
-        give(output, given)
-    };
-    status(tick())
+        give(output, filled)
+    })
 }
 
 #[cfg(test)]

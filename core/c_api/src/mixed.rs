@@ -1,4 +1,4 @@
-//! Everything beside a tick, from C and from Rust in one sequence: the same bits. And what each call refuses.
+//! All calls next to a tick, from C and from Rust in one sequence: the same bits. And what each call refuses.
 
 use super::tests::{INPUT, LIMITS, made, pair};
 use super::*;
@@ -211,7 +211,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
         let out = joint.tick(&images, &mut store, &mut state, &input);
         assert_eq!((c_out.command_counts, c_out.output_counts), (out.command.counts(), out.output.counts()));
         assert_eq!((c_out.correction_rad, c_out.flags), (out.correction_rad, out.flags.bits()));
-        assert_eq!((c_out.uncertainty_rad, c_out.quality), (out.uncertainty_rad, quality_code(out.quality)));
+        assert_eq!((c_out.uncertainty_rad, c_out.quality), (out.uncertainty_rad, out.quality.code()));
         corrected += u32::from(out.correction_rad != 0.0 && out.flags == Flags::default());
 
         // A star now and then: the output is off by what the learner is to find.
@@ -375,7 +375,7 @@ fn questions(
     let expected = joint.forward(store, &mut state.play().clone(), then, torque);
     assert_eq!((found.output_counts, found.nominal_counts), (expected.output.counts(), expected.nominal.counts()));
     assert_eq!(found.transmission_error_rad.to_bits(), expected.transmission_error_rad.to_bits());
-    assert_eq!((found.uncertainty_rad, found.quality), (expected.uncertainty_rad, quality_code(expected.quality)));
+    assert_eq!((found.uncertainty_rad, found.quality), (expected.uncertainty_rad, expected.quality.code()));
     let approaches = [
         (1, Approach::Moving(Direction::Forward)),
         (-1, Approach::Moving(Direction::Backward)),
@@ -387,7 +387,7 @@ fn questions(
         let expected = joint.inverse(store, OutputAngle::from_counts(target), torque, approach);
         assert_eq!((asked, found.generator_counts), (Done, expected.generator.counts()));
         assert_eq!(found.predicted_error_rad.to_bits(), expected.predicted_error_rad.to_bits());
-        assert_eq!((found.uncertainty_rad, found.quality), (expected.uncertainty_rad, quality_code(expected.quality)));
+        assert_eq!((found.uncertainty_rad, found.quality), (expected.uncertainty_rad, expected.quality.code()));
     }
     let mut rate = 0.0f32;
     let asked = flexspline_rate_ahead(&o.joint, &*o.store, target, -0.01, torque, 4e-3, &mut rate);
@@ -537,7 +537,7 @@ fn angles_and_groups_are_those_of_rust() {
     assert_eq!((flexspline_is_due(0, 0, 0), flexspline_is_due(5, 5, 5)), (0, 0));
 }
 
-/// A list of records of each kind when it is full, beside the queues of Rust.
+/// A list of records of each kind when it is full, next to the queues of Rust.
 #[test]
 fn a_full_list_loses_what_it_was_told_to_lose() {
     let o = made();

@@ -1,17 +1,7 @@
 //! Versions, and numbers that have a name.
 
-use super::{
-    FLEXSPLINE_FLAG_BOUNDED, FLEXSPLINE_FLAG_GLITCH, FLEXSPLINE_FLAG_HELD_BACK, FLEXSPLINE_FLAG_JOINT_TORN,
-    FLEXSPLINE_FLAG_NOT_CORRECTED, FLEXSPLINE_FLAG_OTHER_IMAGES, FLEXSPLINE_FLAG_OVERRUN, FLEXSPLINE_FLAG_SAFE,
-    FLEXSPLINE_FLAG_SAMPLE_LOST, FLEXSPLINE_FLAG_STATE_TORN, FLEXSPLINE_FLAG_TABLE_DOUBT,
-};
-use super::{FlexsplineActivation, FlexsplineIdentity, FlexsplineImages, FlexsplineInput, FlexsplineJoint};
-use super::{FlexsplineOutput, FlexsplineSettings, FlexsplineState, FlexsplineStateReport, FlexsplineStatus};
-use super::{FlexsplineStore, FlexsplineStoreReport};
-use super::{ask::*, beside::*, encoder::*, learn::*, safe::*, telemetry::*, torque::*};
+use super::*;
 use core::ffi::{CStr, c_char, c_int};
-use core::mem::size_of;
-use flexspline::{Mode, Table};
 
 /// Version of this header: the first of three numbers.
 pub const FLEXSPLINE_VERSION_MAJOR: u32 = 0;
@@ -196,6 +186,11 @@ fn text(texts: &'static [&'static CStr], number: usize) -> *const c_char {
     texts.get(number).copied().unwrap_or(c"?").as_ptr()
 }
 
+/// Text of the one bit that is set; "?" where there is none, or none for it.
+fn name_of_bit(names: &'static [&'static CStr], bits: u16) -> *const c_char {
+    text(names, if bits.is_power_of_two() { bits.trailing_zeros() as usize } else { usize::MAX })
+}
+
 /// Short text of a status.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_status_text(status: c_int) -> *const c_char {
@@ -252,58 +247,47 @@ pub extern "C" fn flexspline_health_name(health: u8) -> *const c_char {
 /// Name of one flag: of `FLEXSPLINE_FLAG_...`, one bit at a time.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_flag_name(flag: u16) -> *const c_char {
-    let name = match flag {
-        FLEXSPLINE_FLAG_SAMPLE_LOST => c"sample lost",
-        FLEXSPLINE_FLAG_GLITCH => c"glitch",
-        FLEXSPLINE_FLAG_OVERRUN => c"overrun",
-        FLEXSPLINE_FLAG_HELD_BACK => c"held back",
-        FLEXSPLINE_FLAG_NOT_CORRECTED => c"not corrected",
-        FLEXSPLINE_FLAG_TABLE_DOUBT => c"table doubt",
-        FLEXSPLINE_FLAG_STATE_TORN => c"state torn",
-        FLEXSPLINE_FLAG_JOINT_TORN => c"joint torn",
-        FLEXSPLINE_FLAG_SAFE => c"safe",
-        FLEXSPLINE_FLAG_OTHER_IMAGES => c"other images",
-        FLEXSPLINE_FLAG_BOUNDED => c"bounded",
-        _ => c"?",
-    };
-    name.as_ptr()
+    const NAMES: [&CStr; 11] = [
+        c"sample lost",
+        c"glitch",
+        c"overrun",
+        c"held back",
+        c"not corrected",
+        c"table doubt",
+        c"state torn",
+        c"joint torn",
+        c"safe",
+        c"other images",
+        c"bounded",
+    ];
+    name_of_bit(&NAMES, flag)
 }
 
 /// Name of one event: of `FLEXSPLINE_EVENT_...`, one bit at a time.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_event_name(event: u16) -> *const c_char {
-    let name = match event {
-        FLEXSPLINE_EVENT_MODE => c"mode",
-        FLEXSPLINE_EVENT_HEALTH => c"health",
-        FLEXSPLINE_EVENT_PAGE_DAMAGED => c"page damaged",
-        FLEXSPLINE_EVENT_TABLE_DOUBT => c"table doubt",
-        FLEXSPLINE_EVENT_FALLBACK => c"fallback",
-        FLEXSPLINE_EVENT_RECOVERED => c"recovered",
-        FLEXSPLINE_EVENT_OVERRUN => c"overrun",
-        FLEXSPLINE_EVENT_STATE_TORN => c"state torn",
-        _ => c"?",
-    };
-    name.as_ptr()
+    const NAMES: [&CStr; 8] =
+        [c"mode", c"health", c"page damaged", c"table doubt", c"fallback", c"recovered", c"overrun", c"state torn"];
+    name_of_bit(&NAMES, event)
 }
 
 /// Name of what is implausible: of `FLEXSPLINE_IMPLAUSIBLE_...`, one bit at a time.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_implausible_name(implausible: u16) -> *const c_char {
-    let name = match implausible {
-        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_LOST => c"generator lost",
-        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_STILL => c"generator still",
-        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_SIGN => c"generator sign",
-        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_RATIO => c"generator ratio",
-        FLEXSPLINE_IMPLAUSIBLE_OUTPUT_STILL => c"output still",
-        FLEXSPLINE_IMPLAUSIBLE_OUTPUT_SIGN => c"output sign",
-        FLEXSPLINE_IMPLAUSIBLE_OUTPUT_RATIO => c"output ratio",
-        FLEXSPLINE_IMPLAUSIBLE_TORQUE_STILL => c"torque still",
-        FLEXSPLINE_IMPLAUSIBLE_TORQUE_SIGN => c"torque sign",
-        FLEXSPLINE_IMPLAUSIBLE_TORQUE_RATIO => c"torque ratio",
-        FLEXSPLINE_IMPLAUSIBLE_LOST => c"lost",
-        _ => c"?",
-    };
-    name.as_ptr()
+    const NAMES: [&CStr; 11] = [
+        c"generator lost",
+        c"generator still",
+        c"generator sign",
+        c"generator ratio",
+        c"output still",
+        c"output sign",
+        c"output ratio",
+        c"torque still",
+        c"torque sign",
+        c"torque ratio",
+        c"lost",
+    ];
+    name_of_bit(&NAMES, implausible)
 }
 
 /// Name of what is done in a tick that came late: of `FLEXSPLINE_OVERRUN_...`.

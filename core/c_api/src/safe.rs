@@ -1,13 +1,11 @@
 //! Protection of a tick's inputs: a test of the sensors at start-up, saved springs that belong to a joint, mending
 //! in a slow group.
 
-use super::learn::FlexsplineSlip;
-use super::{
-    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, Object, apart, clear, copied, get, get_mut, give, put, span,
-    status, usable,
-};
-use core::mem::MaybeUninit;
-use flexspline::{GeneratorAngle, Implausible, Joint, OutputAngle, Readings, StartUp, StartUpSettings, Store};
+use super::*;
+use flexspline::{Implausible, Readings, StartUp, StartUpSettings, StartUpStep, shared};
+
+// The same in C: cbindgen renames it.
+pub use flexspline::StartUpSettings as FlexsplineStartUpSettings;
 
 /// Eight-byte words of a [`FlexsplineStartUp`].
 pub const FLEXSPLINE_START_UP_WORDS: usize = 32;
@@ -40,22 +38,6 @@ pub const FLEXSPLINE_IMPLAUSIBLE_LOST: u16 = 1024;
 #[derive(Debug)]
 pub struct FlexsplineStartUp {
     pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_START_UP_WORDS],
-}
-
-/// How far the motor moves, and what is expected of it.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct FlexsplineStartUpSettings {
-    /// Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and
-    /// half a turn at most.
-    pub way_rad: f32,
-    /// Error of the output in one move, rad: twice the error that the table states is enough.
-    pub output_error_rad: f32,
-    /// Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above
-    /// 0.
-    pub drag_n_m: f32,
-    /// Ticks for each way, 8 or more; the last half of each is for the servo to settle.
-    pub ticks: u16,
 }
 
 /// Sensor readings in a tick of the test. Angles are counts of 2^-32 turn.
@@ -96,22 +78,14 @@ pub extern "C" fn flexspline_start_up_init(
     start_up: *mut FlexsplineStartUp,
     joint: *const FlexsplineJoint,
     generator_counts: i64,
-    settings: *const FlexsplineStartUpSettings,
+    settings: *const StartUpSettings,
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         apart([span(start_up), span(joint)])?;
-        let s = copied(settings)?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let settings = StartUpSettings {
-            way_rad: s.way_rad,
-            ticks: s.ticks,
-            output_error_rad: s.output_error_rad,
-            drag_n_m: s.drag_n_m,
-        };
-        let made = StartUp::new(joint, GeneratorAngle::from_counts(generator_counts), &settings);
+        let generator = GeneratorAngle::from_counts(generator_counts);
+        let made = StartUp::new(joint_of(joint)?, generator, &copied(settings)?);
         put(start_up, Object::StartUp, made.map_err(|_| FlexsplineStatus::Argument)?)
-    };
-    status(make())
+    })
 }
 
 /// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the
@@ -123,27 +97,20 @@ pub extern "C" fn flexspline_start_up_step(
     readings: *const FlexsplineReadings,
     step: *mut FlexsplineStartUpStep,
 ) -> FlexsplineStatus {
-    let take = || {
-        apart([span(start_up), span(step)])?;
-        usable(step)?;
+    answer(step, [span(start_up), span(readings)], || {
         let r = copied(readings)?;
         let start_up: &mut StartUp = get_mut(start_up, Object::StartUp)?;
-        let readings = Readings {
+        let StartUpStep { command, found } = start_up.step(&Readings {
             generator: (r.has_generator != 0).then_some(GeneratorAngle::from_counts(r.generator_counts)),
             output: (r.has_output != 0).then_some(OutputAngle::from_counts(r.output_counts)),
             torque_n_m: (r.has_torque != 0).then_some(r.torque_n_m),
-        };
-        let found = start_up.step(&readings);
-        give(
-            step,
-            FlexsplineStartUpStep {
-                command_counts: found.command.counts(),
-                implausible: found.found.map_or(0, Implausible::bits),
-                is_done: found.found.is_some() as u8,
-            },
-        )
-    };
-    status(take())
+        });
+        Ok(FlexsplineStartUpStep {
+            command_counts: command.counts(),
+            implausible: found.map_or(0, Implausible::bits),
+            is_done: found.is_some() as u8,
+        })
+    })
 }
 
 /// As `flexspline_slip_save`, with joint and table: the bytes are restored for the same ones alone.
@@ -156,14 +123,10 @@ pub extern "C" fn flexspline_slip_save_for(
     saved_bytes: usize,
     written: *mut usize,
 ) -> FlexsplineStatus {
-    let save = || {
-        clear(span(written), [span(joint), span(store)])?;
+    answer(written, [span(slip), span(joint), span(store), (saved as usize, saved_bytes)], || {
         clear((saved as usize, saved_bytes), [span(joint), span(store)])?;
-        let owner =
-            flexspline::shared::owner(get::<_, Joint>(joint, Object::Joint)?, get::<_, Store>(store, Object::Store)?);
-        super::learn::save_slip(slip, owner, saved, saved_bytes, written)
-    };
-    status(save())
+        save_slip(slip, shared::owner(joint_of(joint)?, store_of(store)?), saved, saved_bytes)
+    })
 }
 
 /// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table:
@@ -176,11 +139,8 @@ pub extern "C" fn flexspline_slip_restore_for(
     saved: *const u8,
     saved_bytes: usize,
 ) -> FlexsplineStatus {
-    let restore = || {
+    status(|| {
         clear(span(slip), [span(joint), span(store)])?;
-        let owner =
-            flexspline::shared::owner(get::<_, Joint>(joint, Object::Joint)?, get::<_, Store>(store, Object::Store)?);
-        super::learn::restore_slip(slip, owner, saved, saved_bytes)
-    };
-    status(restore())
+        restore_slip(slip, shared::owner(joint_of(joint)?, store_of(store)?), saved, saved_bytes)
+    })
 }

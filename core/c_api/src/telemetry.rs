@@ -1,13 +1,6 @@
 //! Records of telemetry: kept in the tick, taken out and sent when there is time.
 
-use super::beside::{FLEXSPLINE_RECORD_BYTES, health_code, health_of, quality_code, quality_of};
-use super::names::FLEXSPLINE_MODE_SAFE;
-use super::{
-    FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, Object, apart, clear, copied, get, get_mut,
-    give, given, put, span, status, usable,
-};
-use core::mem::{MaybeUninit, size_of};
-use flexspline::{JointState, Mode, Store};
+use super::*;
 use flexspline_telemetry::{Record, RecordError, is_due};
 
 /// Eight-byte words of a [`FlexsplineRecorder`].
@@ -94,17 +87,17 @@ fn c_record(record: &Record) -> FlexsplineRecord {
         words_mended: record.words_mended,
         words_skipped: record.words_skipped,
         pages_damaged: record.pages_damaged,
-        quality: quality_code(record.quality),
+        quality: record.quality.code(),
         mode: record.mode.code() as u8,
-        health: health_code(record.health),
+        health: record.health.code(),
     }
 }
 
 fn read(record: &FlexsplineRecord) -> Result<Record, FlexsplineStatus> {
-    let (quality, health) = (quality_of(record.quality)?, health_of(record.health)?);
-    if record.mode > FLEXSPLINE_MODE_SAFE {
+    let (quality, health) = (Quality::from_code(record.quality), Health::from_code(record.health));
+    let (Some(quality), Some(health), ..=FLEXSPLINE_MODE_SAFE) = (quality, health, record.mode) else {
         return Err(FlexsplineStatus::Argument);
-    }
+    };
     Ok(Record {
         number: record.number,
         lost: record.lost,
@@ -173,7 +166,7 @@ pub extern "C" fn flexspline_recorder_init(
     offset: u32,
     full: u8,
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         let lose_new = match full {
             FLEXSPLINE_FULL_LOSE_OLDEST => false,
             FLEXSPLINE_FULL_LOSE_NEW => true,
@@ -184,8 +177,7 @@ pub extern "C" fn flexspline_recorder_init(
         }
         let ring = KeptRing { divisor, offset, places, first: 0, filled: 0, number: 0, lost: 0, lose_new };
         put(recorder, Object::Recorder, ring)
-    };
-    status(make())
+    })
 }
 
 /// One tick, after `flexspline_tick`: kept if it is due, or whether due or not (`at_once` 1: something happened). Never
@@ -200,15 +192,13 @@ pub extern "C" fn flexspline_recorder_see(
     store: *const FlexsplineStore,
     output: *const FlexsplineOutput,
 ) -> FlexsplineStatus {
-    let see = || {
+    status(|| {
         usable(records)?;
         let given = given(output)?;
         clear(span(recorder), [span(state), span(store), span(output)])?;
         let kept: &mut KeptRing = get_mut(recorder, Object::Recorder)?;
-        let list = (records as usize, length(kept.places));
-        clear(list, [span(recorder), span(state), span(store), span(output)])?;
-        let state: &JointState = get(state, Object::State)?;
-        let store: &Store = get(store, Object::Store)?;
+        clear((records as usize, length(kept.places)), [span(recorder), span(state), span(store), span(output)])?;
+        let (state, store) = (state_of(state)?, store_of(store)?);
         if at_once == 0 && !is_due(tick, kept.divisor, kept.offset) {
             return Ok(());
         }
@@ -218,8 +208,7 @@ pub extern "C" fn flexspline_recorder_see(
             Some(place) => give(records.wrapping_add(place as usize), record),
             None => Ok(()),
         }
-    };
-    status(see())
+    })
 }
 
 /// Takes the oldest record out: `is_taken` is 1, or 0 if none waits, and `record` is as it was. With the interrupt of
@@ -231,11 +220,10 @@ pub extern "C" fn flexspline_recorder_take(
     record: *mut FlexsplineRecord,
     is_taken: *mut u8,
 ) -> FlexsplineStatus {
-    let take = || {
+    answer(is_taken, [span(recorder), span(record)], || {
         usable(records)?;
         usable(record)?;
-        usable(is_taken)?;
-        apart([span(recorder), span(record), span(is_taken)])?;
+        apart([span(recorder), span(record)])?;
         let kept: &mut KeptRing = get_mut(recorder, Object::Recorder)?;
         let list = (records as usize, length(kept.places));
         clear(list, [span(recorder), span(record), span(is_taken)])?;
@@ -243,9 +231,8 @@ pub extern "C" fn flexspline_recorder_take(
         if let Some(place) = found {
             give(record, copied(records.wrapping_add(place as usize))?)?;
         }
-        give(is_taken, found.is_some() as u8)
-    };
-    status(take())
+        Ok(found.is_some() as u8)
+    })
 }
 
 /// Writes a record as `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32, for the ground: docs/telemetry.xtce.xml is their
@@ -255,27 +242,18 @@ pub extern "C" fn flexspline_record_encode(
     record: *const FlexsplineRecord,
     bytes: *mut [u8; FLEXSPLINE_RECORD_BYTES],
 ) -> FlexsplineStatus {
-    let encode = || {
-        apart([span(record), span(bytes)])?;
-        usable(bytes)?;
-        give(bytes, read(&copied(record)?)?.encode())
-    };
-    status(encode())
+    answer(bytes, [span(record)], || Ok(read(&copied(record)?)?.encode()))
 }
 
 /// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no
 /// record, `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_record_decode(first: *const u8, record: *mut FlexsplineRecord) -> FlexsplineStatus {
-    let decode = || {
-        usable(record)?;
-        apart([span(record), (first as usize, FLEXSPLINE_RECORD_BYTES)])?;
-        let found = copied(first.cast::<[u8; FLEXSPLINE_RECORD_BYTES]>())?;
-        let found = Record::decode(&found).map_err(|error| match error {
+    answer(record, [(first as usize, FLEXSPLINE_RECORD_BYTES)], || {
+        let found = Record::decode(&copied(first.cast::<[u8; FLEXSPLINE_RECORD_BYTES]>())?);
+        found.map(|record| c_record(&record)).map_err(|error| match error {
             RecordError::Version { .. } => FlexsplineStatus::Argument,
             RecordError::Mark | RecordError::Crc { .. } | RecordError::Reserved => FlexsplineStatus::Saved,
-        })?;
-        give(record, c_record(&found))
-    };
-    status(decode())
+        })
+    })
 }

@@ -1,11 +1,7 @@
 //! Which torque a tick is given, how old it is, and the rate that goes with a command.
 
-use super::{
-    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, Object, apart, clear, copied, get, get_mut, give, put, span,
-    status, usable,
-};
-use core::mem::MaybeUninit;
-use flexspline::{Aged, Direction, Joint, OutputAngle, Store, TorquePath, TorqueReading, TorqueSettings};
+use super::*;
+use flexspline::{Aged, TorquePath, TorqueReading, TorqueSettings};
 
 /// Eight-byte words of a [`FlexsplineTorquePath`].
 pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 8;
@@ -52,7 +48,7 @@ pub struct FlexsplineTorqueSettings {
 }
 
 /// The direction of a sign: what is 0 is none.
-fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
+pub(super) fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
     match sign {
         1 => Ok(Direction::Forward),
         -1 => Ok(Direction::Backward),
@@ -85,7 +81,7 @@ pub extern "C" fn flexspline_torque_init_sensor(
     settle_s: f32,
     largest_n_m: f32,
 ) -> FlexsplineStatus {
-    let make = || {
+    status(|| {
         let s = copied(settings)?;
         let settings = TorqueSettings {
             tick_s: s.tick_s,
@@ -97,8 +93,7 @@ pub extern "C" fn flexspline_torque_init_sensor(
             largest_n_m,
         };
         put(path, Object::TorquePath, TorquePath::new(settings).map_err(|_| FlexsplineStatus::Argument)?)
-    };
-    status(make())
+    })
 }
 
 /// One tick: a reading, N m, positive where it turns the output forward, where it was measured
@@ -114,24 +109,17 @@ pub extern "C" fn flexspline_torque_tick(
     direction: i8,
     torque_n_m: *mut f32,
 ) -> FlexsplineStatus {
-    let tick = || {
-        apart([span(path), span(torque_n_m)])?;
-        usable(torque_n_m)?;
+    answer(torque_n_m, [span(path)], || {
         let path: &mut TorquePath = get_mut(path, Object::TorquePath)?;
         let reading = match place {
             FLEXSPLINE_TORQUE_ON_LOAD => TorqueReading::OnLoad(reading_n_m),
             FLEXSPLINE_TORQUE_IN_MESH => TorqueReading::InMesh(reading_n_m),
             _ => return Err(FlexsplineStatus::Argument),
         };
-        let direction = direction_of(direction)?;
-        let torque = path.tick(reading, direction);
+        let torque = path.tick(reading, direction_of(direction)?);
         // A damaged path gives NaN, and a sound one is not looked at twice.
-        if torque.is_nan() && path.is_damaged() {
-            return Err(FlexsplineStatus::NotInitialised);
-        }
-        give(torque_n_m, torque)
-    };
-    status(tick())
+        if torque.is_nan() && path.is_damaged() { Err(FlexsplineStatus::NotInitialised) } else { Ok(torque) }
+    })
 }
 
 /// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to
@@ -145,21 +133,20 @@ pub extern "C" fn flexspline_torque_set_sensor(
     jump_n_m: f32,
     frozen_ticks: u16,
 ) -> FlexsplineStatus {
-    let set = || {
+    status(|| {
         let path: &mut TorquePath = get_mut(path, Object::TorquePath)?;
         if path.is_damaged() {
             return Err(FlexsplineStatus::NotInitialised);
         }
         *path = path.with_sensor(jump_n_m, frozen_ticks).map_err(|_| FlexsplineStatus::Argument)?;
         Ok(())
-    };
-    status(set())
+    })
 }
 
 /// Nothing measured yet; what is older than `most_ticks` is not used.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_aged_init(aged: *mut FlexsplineAged, most_ticks: u16) -> FlexsplineStatus {
-    status(put(aged, Object::Aged, Aged::new(most_ticks)))
+    status(|| put(aged, Object::Aged, Aged::new(most_ticks)))
 }
 
 /// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too
@@ -172,24 +159,16 @@ pub extern "C" fn flexspline_aged_tick(
     measured: f32,
     value: *mut f32,
 ) -> FlexsplineStatus {
-    let tick = || {
-        apart([span(aged), span(value)])?;
-        usable(value)?;
+    answer(value, [span(aged)], || {
         let aged: &mut Aged = get_mut(aged, Object::Aged)?;
-        give(value, aged.tick((has_measured != 0).then_some(measured)))
-    };
-    status(tick())
+        Ok(aged.tick((has_measured != 0).then_some(measured)))
+    })
 }
 
 /// 1 if there is no value that may be used, else 0: ask for the sensor.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_aged_is_stale(aged: *const FlexsplineAged, is_stale: *mut u8) -> FlexsplineStatus {
-    let fill = || {
-        apart([span(aged), span(is_stale)])?;
-        let aged: &Aged = get(aged, Object::Aged)?;
-        give(is_stale, aged.is_stale() as u8)
-    };
-    status(fill())
+    answer(is_stale, [span(aged)], || Ok(get::<_, Aged>(aged, Object::Aged)?.is_stale() as u8))
 }
 
 /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what
@@ -206,17 +185,13 @@ pub extern "C" fn flexspline_rate_ahead(
     ahead_s: f32,
     generator_rate_rad_s: *mut f32,
 ) -> FlexsplineStatus {
-    let fill = || {
-        clear(span(generator_rate_rad_s), [span(joint), span(store)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
+    answer(generator_rate_rad_s, [span(joint), span(store)], || {
+        let (joint, store) = (joint_of(joint)?, store_of(store)?);
         if !(ahead_s > 0.0 && ahead_s.is_finite() && rate_rad_s.is_finite()) {
             return Err(FlexsplineStatus::Argument);
         }
-        let target = OutputAngle::from_counts(target_counts);
-        give(generator_rate_rad_s, joint.rate_ahead(store, target, rate_rad_s, torque_n_m, ahead_s))
-    };
-    status(fill())
+        Ok(joint.rate_ahead(store, OutputAngle::from_counts(target_counts), rate_rad_s, torque_n_m, ahead_s))
+    })
 }
 
 /// How the generator has to move so that the output moves as it shall.
@@ -244,17 +219,13 @@ pub extern "C" fn flexspline_motion_ahead(
     ahead_s: f32,
     ahead: *mut FlexsplineMotionAhead,
 ) -> FlexsplineStatus {
-    let fill = || {
-        clear(span(ahead), [span(joint), span(store)])?;
-        let joint: &Joint = get(joint, Object::Joint)?;
-        let store: &Store = get(store, Object::Store)?;
+    answer(ahead, [span(joint), span(store)], || {
+        let (joint, store) = (joint_of(joint)?, store_of(store)?);
         if !(ahead_s > 0.0 && ahead_s.is_finite() && rate_rad_s.is_finite() && acceleration_rad_s2.is_finite()) {
             return Err(FlexsplineStatus::Argument);
         }
-        let target = OutputAngle::from_counts(target_counts);
-        let [rate_rad_s, acceleration_rad_s2] =
-            joint.motion_ahead(store, target, [rate_rad_s, acceleration_rad_s2], torque_n_m, ahead_s);
-        give(ahead, FlexsplineMotionAhead { rate_rad_s, acceleration_rad_s2 })
-    };
-    status(fill())
+        let (target, rates) = (OutputAngle::from_counts(target_counts), [rate_rad_s, acceleration_rad_s2]);
+        let [rate_rad_s, acceleration_rad_s2] = joint.motion_ahead(store, target, rates, torque_n_m, ahead_s);
+        Ok(FlexsplineMotionAhead { rate_rad_s, acceleration_rad_s2 })
+    })
 }

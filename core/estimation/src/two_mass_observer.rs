@@ -40,15 +40,16 @@ use flexspline::{GeneratorAngle, Joint, OutputAngle, PlayState, Prediction, Qual
 use nalgebra::{Matrix2, Matrix2x4, Matrix3x4, Matrix4, Matrix4x2, RowVector4, Vector2, Vector3, Vector4};
 
 /// Two inertias, at the output.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertias {
-    /// Motor, generator and what turns with them: their inertia times the square of the ratio, kg·m².
+    /// Motor, generator and what turns with them: their inertia times the square of the ratio, kg m^2.
     pub motor_kg_m2: f64,
-    /// Load, kg·m².
+    /// Load, kg m^2.
     pub load_kg_m2: f64,
-    /// Torsional stiffness, N·m/rad: the slope of the wind-up.
+    /// Torsional stiffness, N m/rad: the slope of the wind-up.
     pub stiffness_n_m_per_rad: f64,
-    /// Damping beside it, N·m·s/rad.
+    /// Damping parallel to it, N m s/rad.
     pub damping_n_m_s_per_rad: f64,
 }
 
@@ -65,10 +66,11 @@ pub struct Noise {
     pub twist_rad: Option<f64>,
 }
 
-/// Measurements of a tick.
+/// Measurements of a tick, for the observer.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// Motor torque times the ratio in the tick before, N·m.
+    /// Motor torque times the ratio in the tick before, N m.
     pub torque_n_m: f32,
     /// Motor speed over the ratio, rad/s.
     pub speed_rad_s: f32,
@@ -158,12 +160,13 @@ impl Words for Estimated {
     }
 }
 
-/// How far what is measured and assumed can be off: bounds, each ±.
+/// How far what is measured and assumed can be off: bounds, each +-.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Disturbance {
-    /// Motor torque at the output, N·m.
+    /// Motor torque at the output, N m.
     pub torque_n_m: f32,
-    /// Change of the torque on the load in a tick, N·m.
+    /// Change of the torque on the load in a tick, N m.
     pub load_change_n_m: f32,
     /// Motor speed over the ratio as measured, rad/s.
     pub speed_rad_s: f32,

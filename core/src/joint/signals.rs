@@ -83,6 +83,57 @@ impl Flags {
     }
 }
 
+/// Implausible readings of the sensors; a set of the constants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Implausible(u16);
+
+impl Implausible {
+    /// The generator's encoder gave no sample.
+    pub const GENERATOR_LOST: Self = Self(1);
+    /// The generator's encoder did not move.
+    pub const GENERATOR_STILL: Self = Self(2);
+    /// The generator's encoder moved the other way.
+    pub const GENERATOR_SIGN: Self = Self(4);
+    /// The generator's encoder moved by another way: counts in a turn, unit, or a motor that does not follow.
+    pub const GENERATOR_RATIO: Self = Self(8);
+    /// The output did not move.
+    pub const OUTPUT_STILL: Self = Self(16);
+    /// The output moved the other way.
+    pub const OUTPUT_SIGN: Self = Self(32);
+    /// The output moved by another way than the ratio says: unit, ratio, or the member that is fixed.
+    pub const OUTPUT_RATIO: Self = Self(64);
+    /// The torque did not change with the direction.
+    pub const TORQUE_STILL: Self = Self(128);
+    /// The torque changed the other way.
+    pub const TORQUE_SIGN: Self = Self(256);
+    /// The torque changed by less than a third or more than three times what the drag says: a unit.
+    pub const TORQUE_RATIO: Self = Self(512);
+    /// A reading came and went, or was no number.
+    pub const LOST: Self = Self(1024);
+
+    /// Whether nothing is wrong.
+    #[must_use]
+    pub const fn is_plausible(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether all of `other` are set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// As bits.
+    #[must_use]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    pub(super) const fn with(self, other: Self, set: bool) -> Self {
+        Self(self.0 | if set { other.0 } else { 0 })
+    }
+}
+
 /// One tick's results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {

@@ -36,23 +36,24 @@
 
 use super::limits::{SettingError, checked};
 use super::runtime::Joint;
+use super::signals::Implausible;
 use crate::angle::{GeneratorAngle, OutputAngle};
 use crate::whole::{Sealed, words};
 
 /// How far the motor moves, and what is expected of it.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartUpSettings {
-    /// Way of the generator, there and back, rad: positive turns it counter-clockwise. At the output it must be ten
-    /// times `output_error_rad` at least, and half a turn at most.
+    /// Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and
+    /// half a turn at most.
     pub way_rad: f32,
-    /// Ticks for each way, 8 or more; the last half of each is for the servo to settle.
-    pub ticks: u16,
-    /// Error of the output in one move, rad: twice the error that the table states
-    /// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is enough.
+    /// Error of the output in one move, rad: twice the error that the table states is enough.
     pub output_error_rad: f32,
-    /// Coulomb drag of the output that a torque in the mesh turns over by, N·m; it may be wrong by three times. Above
+    /// Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above
     /// 0.
     pub drag_n_m: f32,
+    /// Ticks for each way, 8 or more; the last half of each is for the servo to settle.
+    pub ticks: u16,
 }
 
 /// Sensor readings of a tick; `None` for a missing one.
@@ -64,57 +65,6 @@ pub struct Readings {
     pub output: Option<OutputAngle>,
     /// A torque that is measured in the mesh, N·m. (One on the load says nothing about a motion.)
     pub torque_n_m: Option<f32>,
-}
-
-/// Implausible readings of the sensors; a set of the constants.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Implausible(u16);
-
-impl Implausible {
-    /// The generator's encoder gave no sample.
-    pub const GENERATOR_LOST: Self = Self(1);
-    /// The generator's encoder did not move.
-    pub const GENERATOR_STILL: Self = Self(2);
-    /// The generator's encoder moved the other way.
-    pub const GENERATOR_SIGN: Self = Self(4);
-    /// The generator's encoder moved by another way: counts in a turn, unit, or a motor that does not follow.
-    pub const GENERATOR_RATIO: Self = Self(8);
-    /// The output did not move.
-    pub const OUTPUT_STILL: Self = Self(16);
-    /// The output moved the other way.
-    pub const OUTPUT_SIGN: Self = Self(32);
-    /// The output moved by another way than the ratio says: unit, ratio, or the member that is fixed.
-    pub const OUTPUT_RATIO: Self = Self(64);
-    /// The torque did not change with the direction.
-    pub const TORQUE_STILL: Self = Self(128);
-    /// The torque changed the other way.
-    pub const TORQUE_SIGN: Self = Self(256);
-    /// The torque changed by less than a third or more than three times what the drag says: a unit.
-    pub const TORQUE_RATIO: Self = Self(512);
-    /// A reading came and went, or was no number.
-    pub const LOST: Self = Self(1024);
-
-    /// Whether nothing is wrong.
-    #[must_use]
-    pub const fn is_plausible(self) -> bool {
-        self.0 == 0
-    }
-
-    /// Whether all of `other` are set.
-    #[must_use]
-    pub const fn contains(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// As bits.
-    #[must_use]
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
-    const fn with(self, other: Self, set: bool) -> Self {
-        Self(self.0 | if set { other.0 } else { 0 })
-    }
 }
 
 /// Command and result of a tick of the test.
