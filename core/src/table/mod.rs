@@ -79,8 +79,15 @@ impl GeneratorKind {
 
     /// From the code in an image.
     #[must_use]
-    pub fn from_code(code: u8) -> Option<Self> {
-        [Self::Other, Self::TwoRoller, Self::FourRoller, Self::DoubleDisc, Self::Cam].get(code as usize).copied()
+    pub const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Other),
+            1 => Some(Self::TwoRoller),
+            2 => Some(Self::FourRoller),
+            3 => Some(Self::DoubleDisc),
+            4 => Some(Self::Cam),
+            _ => None,
+        }
     }
 }
 
