@@ -21,10 +21,6 @@ pub(super) struct Facts {
     pub whole: bool,
     /// Whether it never falls.
     pub rises: bool,
-    /// Share of the rows that repeat the one before.
-    pub repeats: f64,
-    /// One value in this many rows, where most are empty.
-    pub every: usize,
     /// The number after which it begins anew, if it does.
     pub anew: Option<Anew>,
 }
@@ -35,23 +31,14 @@ impl Facts {
         let (least, most) = least_and_most(values.iter().copied());
         let some = &values[..values.len().min(LOOKED_AT)];
         let steps: Vec<f64> = some.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let moved: Vec<f64> = steps.iter().map(|step| step.abs()).filter(|step| *step > 0.0).collect();
-        let count = steps.len().max(1) as f64;
         let whole = !column.decimals && !values.is_empty() && values.iter().all(|value| value.fract() == 0.0);
         Facts {
             finite: values.len(),
             least,
             most,
-            step: moved.iter().copied().fold(f64::INFINITY, f64::min),
+            step: steps.iter().map(|step| step.abs()).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min),
             whole,
             rises: steps.iter().all(|step| *step >= 0.0),
-            repeats: 1.0 - moved.len() as f64 / count,
-            every: if values.is_empty() {
-                0
-            } else {
-                // Cells that are words hold something, though no number.
-                (column.values.len() as f64 / (values.len() + column.words.count) as f64).round() as usize
-            },
             anew: begins_anew(&column.values, &turns().collect::<Vec<_>>(), whole, None),
         }
     }
@@ -92,7 +79,7 @@ mod tests {
     #[test]
     fn facts_are_those_of_the_numbers() {
         let f = facts((0..100).map(|k| if k % 4 == 0 { f64::from(k) } else { f64::NAN }));
-        assert_eq!((f.finite, f.every, f.step, f.whole, f.rises), (25, 4, 4.0, true, true));
+        assert_eq!((f.finite, f.step, f.whole, f.rises), (25, 4.0, true, true));
         assert!(facts([2.0; 20]).constant());
     }
 }

@@ -80,7 +80,7 @@ impl Role {
 }
 
 /// A column.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Column {
     /// Its name, `#1` and so on where the file has none.
     pub name: String,
@@ -135,8 +135,7 @@ pub struct Looked {
     pub header_line: Option<u64>,
     /// The columns.
     pub columns: Vec<Column>,
-    /// Other columns that may be generator and output as well, or the same ones with other counts of a turn, the
-    /// likeliest first.
+    /// Other columns that may be generator and output as well, the likeliest first.
     pub rivals: Vec<Rival>,
     /// Turns of the generator for one of the output as the rows have it, signed.
     pub ratio_found: Option<f64>,
@@ -163,8 +162,8 @@ pub struct Rival {
     pub generator: String,
     /// The column of the output.
     pub output: String,
-    /// Turns of the generator for one of the output, signed.
-    pub ratio: f64,
+    /// Turns of the generator for one of the output, signed; `None` where a unit is open.
+    pub ratio: Option<f64>,
     /// The value for `--columns` if these are meant; `None` where a unit is open.
     pub columns_option: Option<String>,
     /// Why the pair proposed goes before it.
@@ -174,33 +173,36 @@ pub struct Rival {
 /// A column at work.
 #[derive(Clone, Default)]
 struct Guess {
+    /// As it is reported; its unit is written last.
+    column: Column,
+    /// Its name in a mapping.
+    name: String,
     facts: Facts,
     said: Said,
-    role: Role,
     unit: Option<Unit>,
     /// A unit that is written and not known.
     unknown_unit: Option<String>,
-    /// Counts of a turn of counts.
-    counts: Option<f64>,
     negative: bool,
-    confidence: f64,
-    why: Vec<String>,
-    used: bool,
     /// Numbers made continuous.
     values: Vec<f64>,
-    /// Of which file each is, from 0.
+    /// File of each number, from 0.
     of_file: Arc<[f64]>,
 }
 
 impl Guess {
     fn because(&mut self, why: impl Into<String>, confidence: f64) {
-        self.why.push(why.into());
-        self.confidence = confidence;
+        self.column.why.push(why.into());
+        self.column.confidence = confidence;
+    }
+
+    /// Whether it has this role and is in use.
+    fn serves_as(&self, role: Role) -> bool {
+        self.column.used && self.column.role == role
     }
 
     /// One of its numbers, rad, if that can be decided.
     fn rad(&self) -> Option<f64> {
-        turns::rad(self.unit?, self.counts)
+        turns::rad(self.unit?, self.column.counts_per_turn)
     }
 
     /// Its numbers, rad, if that can be decided.
@@ -212,11 +214,8 @@ impl Guess {
     /// Whether a time is in days as spreadsheets count them: a date from 1954 to 2119, and rows at most a quarter of an
     /// hour apart.
     fn is_in_days(&self) -> bool {
-        (20_000.0..=80_000.0).contains(&self.facts.least)
-            && self.facts.most <= 80_000.0
-            && self.facts.most - self.facts.least < 1000.0
-            && !self.facts.whole
-            && self.facts.step < 0.01
+        let Facts { least, most, step, whole, .. } = self.facts;
+        least >= 20_000.0 && most <= 80_000.0 && most - least < 1000.0 && !whole && step < 0.01
     }
 
     fn moves(&self) -> bool {
@@ -229,35 +228,30 @@ impl Guess {
     }
 
     /// The column of the reader by the mapping, if it is in use.
-    fn mapped(&self, place: usize, names: &[String]) -> Option<MappedColumn> {
-        let quantity = self.role.in_mapping().filter(|_| self.used)?;
+    fn mapped(&self, place: usize) -> Option<MappedColumn> {
+        let quantity = self.column.role.in_mapping().filter(|_| self.column.used)?;
         let reading = Reading::parse(&self.written()?, quantity.family(), None).ok()?;
-        let name = names[place].clone();
+        let name = self.name.clone();
         Some(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said: false })
-    }
-
-    /// The column as it is reported.
-    fn column(self, name: &str) -> Column {
-        Column {
-            name: name.to_owned(),
-            role: self.role,
-            unit: self.written(),
-            confidence: self.confidence,
-            least: self.facts.least,
-            most: self.facts.most,
-            step: self.facts.step,
-            missing: self.values.len() - self.facts.finite,
-            counts_per_turn: self.counts,
-            used: self.used,
-            why: self.why,
-        }
     }
 
     /// The unit as a mapping takes it.
     fn written(&self) -> Option<String> {
         let sign = if self.negative { "-" } else { "" };
-        turns::written(self.unit?, self.counts).map(|unit| sign.to_owned() + &unit)
+        turns::written(self.unit?, self.column.counts_per_turn).map(|unit| sign.to_owned() + &unit)
     }
+
+    /// Its entry in a mapping, with a word in place of a unit that is open.
+    fn entry(&self) -> String {
+        let open = if self.unit.is_some() { "count/COUNTS" } else { "UNIT" };
+        let quantity = self.column.role.in_mapping().map_or("", Quantity::name);
+        format!("{quantity}={}:{}", self.name, self.written().as_deref().unwrap_or(open))
+    }
+}
+
+/// The column in use for a role.
+fn used(guesses: &[Guess], role: Role) -> Option<&Guess> {
+    guesses.iter().find(|guess| guess.serves_as(role))
 }
 
 /// Why files cannot be looked at together.
@@ -301,39 +295,31 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
     let mut guesses: Vec<Guess> = (0..layout.names.len()).map(|place| guess(files, place, &rows)).collect();
     time(&mut guesses, first.columns.lines.len());
     units_of_counts(&mut guesses);
-    let names: Vec<String> = (0..guesses.len()).map(|place| name_in_mapping(&layout.names, place)).collect();
-    let (ratio, rivals) = pair(&mut guesses, &names, &mut notes);
+    let (ratio, rivals) = pair(&mut guesses, &mut notes);
     notes.extend(apart(&guesses).filter(|_| ratio.is_none()));
-    settle(&mut guesses, &mut notes);
+    settle(&mut guesses);
     let proposed = ratio.map(proposed_ratio);
     let error = error_rad(&guesses, proposed);
     torque(&mut guesses, error.as_deref(), &mut notes);
-    if let Some(half) = proposed.filter(|ratio| ratio.fract() != 0.0) {
-        notes.push(format!(
-            "ratios are whole numbers but for wheels with an odd number of teeth: {half} is nearest to these rows"
-        ));
-    }
     ask_for_units(&mut guesses, &mut notes);
-    let mut columns_option = option(&guesses, &names, &mut notes);
+    let mut columns_option = option(&guesses, &mut notes);
     // From here on the rows are those that `calibrate` and `diagnose` have by this mapping.
-    let columns: Vec<MappedColumn> =
-        guesses.iter().enumerate().filter_map(|(k, guess)| guess.mapped(k, &names)).collect();
+    let columns: Vec<MappedColumn> = guesses.iter().enumerate().filter_map(|(k, guess)| guess.mapped(k)).collect();
     let mut read = Vec::new();
     for file in files {
         let (mut rows, refused) = ReadRows::of_raw(file, &columns, ratio);
         notes.extend(rows.notes.drain(..).map(|note| of_file(file, note)));
         if rows.milliseconds {
             // The refusal holds both readings; the mapping holds the one that fits the rows.
-            let time = guesses.iter_mut().filter(|guess| guess.used && guess.role == Role::Time);
+            let time = guesses.iter_mut().filter(|guess| guess.serves_as(Role::Time));
             time.for_each(|time| time.unit = Some(Unit::Millisecond));
-            columns_option = option(&guesses, &names, &mut notes);
+            columns_option = option(&guesses, &mut notes);
         }
         // A cell in use that is no number, or a row of another width, is for people to mend.
         if let Some(refused) = refused {
-            let then = columns_option.as_ref().map_or(String::new(), |columns| format!("; then --columns {columns}"));
             let mend = if rows.milliseconds { "" } else { ": mend it or take it out" };
+            let then = columns_option.take().map_or(String::new(), |columns| format!("; then --columns {columns}"));
             notes.push(format!("{refused}{mend}{then}"));
-            columns_option = None;
         }
         read.push(rows);
     }
@@ -353,7 +339,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
         period_s,
         coverage: coverage::of(&read),
         columns_option,
-        columns: guesses.into_iter().zip(&layout.names).map(|(guess, name)| guess.column(name)).collect(),
+        columns: guesses.into_iter().map(|guess| Column { unit: guess.written(), ..guess.column }).collect(),
         notes,
     })
 }
@@ -368,9 +354,13 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     let said = if layout.has_names { words::said(name, unit.map(String::as_str)) } else { Said::default() };
     let mut values = std::mem::take(&mut cells.values);
     facts.anew.into_iter().for_each(|anew| continued(&mut values, anew.span));
-    let mut guess = Guess { facts, said, values, of_file: of_file.clone(), ..Guess::default() };
+    let (least, most, step, missing) = (facts.least, facts.most, facts.step, values.len() - facts.finite);
+    let column = Column { name: name.clone(), least, most, step, missing, ..Column::default() };
+    let name_in_mapping = name_in_mapping(&layout.names, place);
+    let mut guess =
+        Guess { column, name: name_in_mapping, facts, said, values, of_file: of_file.clone(), ..Guess::default() };
     if cells.times.count > 0 && cells.times.count + cells.empty + cells.words.count >= guess.values.len() {
-        (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
+        (guess.column.role, guess.unit) = (Role::Time, Some(Unit::Iso));
         guess.because("times written as text", 0.95);
         return guess;
     }
@@ -379,52 +369,39 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
         return guess;
     }
     if said.commanded && said.role != Some(Role::Torque) {
-        guess.role = Role::Command;
+        guess.column.role = Role::Command;
         guess.because("its name: what was wanted, not measured", 0.6);
     } else if let Some(role) = said.role {
-        guess.role = role;
+        guess.column.role = role;
         guess.because("its name", if said.commanded { 0.6 } else { 0.8 });
     } else if said.angle {
         guess.because("its name: an angle", 0.5);
     }
-    if let Some(cell) = &cells.words.first {
-        let words = cells.words.count;
-        let what = if words == 1 { "1 cell is".to_owned() } else { format!("{words} cells are") };
-        guess.why.push(format!("{what} no number: line {}, \"{}\"", cell.line, cell.text));
-    }
     if guess.facts.constant() {
         guess.because(format!("keeps the value {}", guess.facts.least), 0.3);
     }
-    if guess.facts.every > 1 {
-        guess.why.push(format!("a value in one of {} rows: slower than the file", guess.facts.every));
-    } else if guess.facts.repeats > 0.6 && !guess.facts.constant() {
-        guess.why.push(format!(
-            "repeats its value in {:.0} % of the rows: slower than the file",
-            100.0 * guess.facts.repeats
-        ));
-    }
     if let Some(anew) = guess.facts.anew {
-        guess.why.push(anew.text(""));
+        guess.column.why.push(anew.text(""));
     }
     let by = if unit.is_some() { "line of units" } else { "name" };
     let written = unit.map(String::as_str).or_else(|| Unit::bracketed(name));
     guess.unknown_unit =
         written.filter(|unit| !["-", "1"].contains(unit) && Unit::in_brackets(unit).is_none()).map(str::to_owned);
     let unit = unit.and_then(|unit| Unit::in_brackets(unit)).or_else(|| Unit::in_name(name));
-    if let Some(unit) = unit.filter(|unit| fits(guess.role, *unit)) {
+    let role = guess.column.role;
+    if let Some(unit) = unit.filter(|unit| fits(role, *unit)) {
         guess.unit = Some(unit);
-        guess.why.push(format!("{unit} by its {by}"));
-    } else if guess.role.is_angle() || matches!(guess.role, Role::Unknown | Role::Command) {
+        guess.column.why.push(format!("{unit} by its {by}"));
+    } else if role.is_angle() || matches!(role, Role::Unknown | Role::Command) {
         unit_of_numbers(&mut guess, name);
-    } else if guess.role == Role::Torque {
-        guess.unit = Some(Unit::NewtonMetre);
-        guess.because("N.m, for want of a unit", 0.5);
-    } else if guess.role == Role::Temperature {
-        guess.unit = Some(if guess.facts.least > 200.0 { Unit::Kelvin } else { Unit::Celsius });
-        guess.why.push("its size".to_owned());
-    } else if guess.role == Role::Error {
-        guess.unit = Some(Unit::Arcsecond);
-        guess.because("arcsec, for want of a unit", 0.5);
+    } else if let Some(unit) = match role {
+        Role::Torque => Some(Unit::NewtonMetre),
+        Role::Error => Some(Unit::Arcsecond),
+        Role::Temperature => Some(Unit::Celsius),
+        _ => None,
+    } {
+        guess.unit = Some(unit);
+        guess.because(format!("{unit}, for want of a unit"), 0.5);
     }
     guess
 }
@@ -445,16 +422,16 @@ fn unit_of_numbers(guess: &mut Guess, name: &str) {
     let counted = ["inc", "count", "tick", "cnt"].iter().any(|word| name.to_lowercase().contains(word));
     if let Some(unit) = by_turn {
         guess.unit = Some(unit);
-        guess.why.push(format!("{unit} by the turn"));
+        guess.column.why.push(format!("{unit} by the turn"));
     } else if guess.facts.whole && (counted || guess.facts.most - guess.facts.least > 1000.0) {
         guess.unit = Some(Unit::Count);
-        guess.why.push("whole numbers: counts".to_owned());
+        guess.column.why.push("whole numbers: counts".to_owned());
     }
 }
 
 /// A sentence on generator and output if no row has both.
 fn apart(guesses: &[Guess]) -> Option<String> {
-    let of = |role: Role| guesses.iter().position(|guess| guess.role == role && guess.moves());
+    let of = |role: Role| guesses.iter().position(|guess| guess.column.role == role && guess.moves());
     let (generator, output) = (of(Role::Generator)?, of(Role::Output)?);
     let mut both = guesses[generator].values.iter().zip(&guesses[output].values);
     let apart = both.all(|(generator, output)| generator.is_nan() || output.is_nan());
@@ -463,29 +440,25 @@ fn apart(guesses: &[Guess]) -> Option<String> {
 
 /// The column of time: by name, or the one that rises evenly.
 fn time(guesses: &mut [Guess], first_file: usize) {
-    if guesses.iter().all(|guess| guess.role != Role::Time) {
+    if guesses.iter().all(|guess| guess.column.role != Role::Time) {
         let evenly = |guess: &Guess| {
             let steps: Vec<f64> = guess.values[..first_file].windows(2).map(|pair| pair[1] - pair[0]).collect();
-            let mut some = sampled(&steps);
-            let usual = median_of(&mut some);
+            let usual = median_of(&mut sampled(&steps));
             // One step in ten may be of another length.
             let odd = steps.iter().filter(|step| (*step - usual).abs() > 0.5 * usual).count();
             guess.facts.rises && usual > 0.0 && 10 * odd < steps.len()
         };
         // Where more than one does, the first: loggers begin with the time.
-        let nameless = |guess: &Guess| guess.role == Role::Unknown && !guess.said.angle;
-        let found = guesses.iter_mut().find(|guess| nameless(guess) && guess.moves() && evenly(guess));
-        if let Some(guess) = found {
-            guess.role = Role::Time;
-            guess.unit = None;
-            guess.counts = None;
+        let nameless = |guess: &Guess| guess.column.role == Role::Unknown && !guess.said.angle;
+        if let Some(guess) = guesses.iter_mut().find(|guess| nameless(guess) && guess.moves() && evenly(guess)) {
+            (guess.column.role, guess.unit) = (Role::Time, None);
             guess.because("rises evenly from row to row", 0.5);
         }
     }
     // Of several that are called so, one that moves.
-    let best = guesses.iter().position(|guess| guess.role == Role::Time && guess.moves());
-    for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.role == Role::Time) {
-        guess.used = Some(place) == best;
+    let best = guesses.iter().position(|guess| guess.column.role == Role::Time && guess.moves());
+    for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.column.role == Role::Time) {
+        guess.column.used = Some(place) == best;
         if guess.unit.is_none() {
             // Seconds since 1970 have ten digits, their thousandths thirteen.
             let size = guess.facts.most;
@@ -498,120 +471,112 @@ fn time(guesses: &mut [Guess], first_file: usize) {
                 _ => (Unit::Second, "s, for want of a unit"),
             };
             guess.unit = Some(unit);
-            let sure = if size > 1e9 { guess.confidence } else { guess.confidence.min(0.6) };
-            guess.because(why, sure);
+            guess.because(why, if size > 1e9 { guess.column.confidence } else { guess.column.confidence.min(0.6) });
         }
     }
 }
 
-/// Roles that only one column may have: the first that moves, and what is left is none.
-fn settle(guesses: &mut [Guess], notes: &mut Vec<String>) {
-    let paired = guesses.iter().any(|guess| guess.used && guess.role == Role::Output);
+/// Roles that only one column may have, besides the output, which a pair decides: the first that moves.
+fn settle(guesses: &mut [Guess]) {
+    let paired = used(guesses, Role::Output).is_some();
     let joints = pair::joints(guesses);
-    for role in [Role::Generator, Role::Output, Role::Error, Role::Temperature, Role::Orientation] {
-        let used = guesses.iter().any(|guess| guess.used && guess.role == role);
-        let may = |guess: &Guess| guess.role == role && guess.moves();
-        let of_these = |guess: &Guess| may(guess) && guess.of_joints(&joints);
-        let place = guesses.iter().position(of_these).or_else(|| guesses.iter().position(may)).filter(|_| !used);
-        // An output that does not follow a generator is none, and an error is not needed in addition to an output.
-        let wanted = match role {
-            Role::Output => false,
-            Role::Error => !paired,
-            _ => true,
-        };
-        if let Some(place) = place.filter(|_| wanted) {
-            guesses[place].used = true;
-            if guesses[place].unit.is_none() && role.is_angle() {
-                guesses[place].unit = Some(Unit::Radian);
-                guesses[place].because("rad, for want of a unit", 0.4);
-            }
+    for role in [Role::Generator, Role::Error, Role::Temperature, Role::Orientation] {
+        // An error is not needed in addition to an output.
+        if used(guesses, role).is_some() || role == Role::Error && paired {
+            continue;
         }
-        let many = guesses.iter().filter(|guess| guess.role == role && guess.moves()).count();
-        if many > 1 && role == Role::Temperature {
-            notes.push(format!("{many} columns of temperature: the first is proposed"));
+        let may = |guess: &Guess| guess.column.role == role && guess.moves();
+        let place = guesses.iter().position(|guess| may(guess) && guess.of_joints(&joints));
+        let Some(place) = place.or_else(|| guesses.iter().position(may)) else { continue };
+        let guess = &mut guesses[place];
+        guess.column.used = true;
+        if guess.unit.is_none() && role.is_angle() {
+            guess.unit = Some(Unit::Radian);
+            guess.because("rad, for want of a unit", 0.4);
         }
     }
 }
 
 /// The error (rad) as far as it can be computed.
 fn error_rad(guesses: &[Guess], ratio: Option<f64>) -> Option<Vec<f64>> {
-    let used = |role: Role| guesses.iter().find(|guess| guess.used && guess.role == role);
-    let (Some(generator), Some(output), Some(ratio)) = (used(Role::Generator), used(Role::Output), ratio) else {
-        return used(Role::Error)?.in_rad();
+    let (Some(generator), Some(output), Some(ratio)) =
+        (used(guesses, Role::Generator), used(guesses, Role::Output), ratio)
+    else {
+        return used(guesses, Role::Error)?.in_rad();
     };
     let (generator, output) = (generator.in_rad()?, output.in_rad()?);
     Some(output.iter().zip(&generator).map(|(output, generator)| output - generator / ratio).collect())
 }
 
 /// Numbers, with commas.
-fn listed<T: ToString>(numbers: &[T]) -> String {
-    numbers.iter().map(T::to_string).collect::<Vec<_>>().join(", ")
+fn listed<T: ToString>(numbers: impl IntoIterator<Item = T>) -> String {
+    numbers.into_iter().map(|number| number.to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// Which column may be the torque, and which way it counts.
 fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>) {
-    let output = guesses.iter().find(|guess| guess.used && guess.role == Role::Output).and_then(Guess::in_rad);
-    let of_role = |guess: &Guess| matches!(guess.role, Role::Torque | Role::Current);
-    let all: Vec<usize> = (0..guesses.len()).filter(|k| of_role(&guesses[*k]) && guesses[*k].moves()).collect();
+    let output = used(guesses, Role::Output).and_then(Guess::in_rad);
     let joints = pair::joints(guesses);
-    let candidates: Vec<usize> = all.iter().copied().filter(|k| guesses[*k].of_joints(&joints)).collect();
-    if !all.is_empty() && candidates.is_empty() {
+    let may = |guess: &Guess| matches!(guess.column.role, Role::Torque | Role::Current) && guess.moves();
+    let candidates: Vec<usize> =
+        (0..guesses.len()).filter(|k| may(&guesses[*k]) && guesses[*k].of_joints(&joints)).collect();
+    if candidates.is_empty() && guesses.iter().any(may) {
         notes.push(format!("the columns of torque are of other joints than {}: none is proposed", listed(&joints)));
         return;
     }
-    if candidates.is_empty() {
-        // A load that does not change is a load: without it the table would be one for none.
-        if let Some(constant) = guesses.iter_mut().find(|guess| guess.role == Role::Torque && guess.facts.finite > 0) {
-            constant.used = true;
-        }
-    }
-    let says = |k: &usize| torque_says(error?, output.as_deref()?, &guesses[*k].values, &guesses[*k].of_file);
-    let says: Vec<_> = candidates.iter().map(says).collect();
-    for (k, says) in candidates.iter().zip(&says) {
+    // A torque before a current, then what explains more.
+    let mut best: Option<(bool, f64, usize)> = None;
+    for &k in &candidates {
+        let guess = &mut guesses[k];
+        let is_torque = guess.column.role == Role::Torque;
+        let says =
+            error.zip(output.as_deref()).and_then(|(error, o)| torque_says(error, o, &guess.values, &guess.of_file));
+        let share = says.map_or(0.0, |says| says.share);
         match says {
             Some(says) if says.is_clear() => {
-                guesses[*k].negative = says.slope < 0.0;
-                let way = if says.slope < 0.0 { "against" } else { "with" };
-                let sure = if guesses[*k].role == Role::Torque { 0.8 } else { 0.5 };
-                let share = 100.0 * says.share;
+                guess.negative = says.slope < 0.0;
+                let way = if guess.negative { "against" } else { "with" };
+                let share = 100.0 * share;
                 let why =
                     format!("the error moves {way} it: it explains {share:.0} % in addition to the turn of the output");
-                guesses[*k].because(why, sure);
+                guess.because(why, if is_torque { 0.8 } else { 0.5 });
             }
-            _ => guesses[*k].because("its sign does not show here", 0.4),
+            _ => guess.because("its sign does not show here", 0.4),
+        }
+        if best.is_none_or(|(torque, most, _)| (is_torque, share) >= (torque, most)) {
+            best = Some((is_torque, share, k));
         }
     }
-    // A torque before a current, then what explains more.
-    let share = |says: &Option<relation::TorqueSays>| says.map_or(0.0, |says| says.share);
-    let is_torque = |k: &usize| guesses[*k].role == Role::Torque;
-    let best = (candidates.iter().zip(&says))
-        .max_by(|(a, x), (b, y)| is_torque(a).cmp(&is_torque(b)).then(share(x).total_cmp(&share(y))));
-    let Some((&best, _)) = best else { return };
-    guesses[best].used = guesses[best].written().is_some_and(|unit| !unit.contains("GAIN"));
-    if !guesses[best].used {
-        let unit = guesses[best].unit.map_or("current", Unit::name);
+    let Some((.., best)) = best else {
+        // A load that does not change is a load: without it the table would be one for none.
+        let constant = |guess: &&mut Guess| guess.column.role == Role::Torque && guess.facts.finite > 0;
+        guesses.iter_mut().find(constant).into_iter().for_each(|guess| guess.column.used = true);
+        return;
+    };
+    let (place, guess) = (best + 1, &mut guesses[best]);
+    let written = guess.written().unwrap_or_else(|| "A*GAIN".to_owned());
+    guess.column.used = !written.contains("GAIN");
+    if !guess.column.used {
+        let unit = guess.unit.map_or("current", Unit::name);
         notes.push(format!(
-            "column {} is in {unit}: give the torque for one of it in place of GAIN, torque=#{}:{}",
-            best + 1,
-            best + 1,
-            guesses[best].written().unwrap_or_else(|| "A*GAIN".to_owned())
+            "column {place} is in {unit}: give the torque for one of it in place of GAIN, torque=#{place}:{written}"
         ));
     }
     if candidates.len() > 1 {
-        let all: Vec<usize> = candidates.iter().map(|k| k + 1).collect();
-        notes.push(format!("columns {} may be the torque: column {} is proposed", listed(&all), best + 1));
+        let all = listed(candidates.iter().map(|k| k + 1));
+        notes.push(format!("columns {all} may be the torque: column {place} is proposed"));
     }
-    if guesses[best].negative {
-        notes.push(format!("column {} counts the torque the other way round: it is proposed with a minus", best + 1));
+    if guess.negative {
+        notes.push(format!("column {place} counts the torque the other way round: it is proposed with a minus"));
     }
 }
 
 /// Asks for the units of columns in use that are written and not known.
 fn ask_for_units(guesses: &mut [Guess], notes: &mut Vec<String>) {
-    for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.used) {
-        let Some((unit, quantity)) = guess.unknown_unit.take().zip(guess.role.in_mapping()) else { continue };
+    for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.column.used) {
+        let Some((unit, quantity)) = guess.unknown_unit.take().zip(guess.column.role.in_mapping()) else { continue };
         let refusal = quantity.refusal(WrongReading::Unit(unit));
-        (guess.unit, guess.counts, guess.confidence) = (None, None, 0.0);
+        (guess.unit, guess.column.counts_per_turn, guess.column.confidence) = (None, None, 0.0);
         notes.push(format!("column {}, {quantity}: {refusal}", place + 1));
     }
 }
@@ -634,44 +599,35 @@ fn clock(read: &[ReadRows]) -> (TimeKind, Option<f64>) {
 }
 
 /// The mapping, if generator and output or an error are known.
-fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Option<String> {
-    let used: Vec<(&Guess, &String)> = guesses.iter().zip(names).filter(|(guess, _)| guess.used).collect();
-    let has = |role: Role| used.iter().any(|(guess, _)| guess.role == role && guess.written().is_some());
+fn option(guesses: &[Guess], notes: &mut Vec<String>) -> Option<String> {
     let is_open = |guess: &Guess| guess.written().is_none();
-    // Entries of a mapping, with a word in place of a unit that is open.
     let entries = |with: &dyn Fn(&Guess) -> bool| {
-        let entry = |(guess, name): &(&Guess, &String)| {
-            let open = if guess.unit.is_some() { "count/COUNTS" } else { "UNIT" };
-            let unit = guess.written().unwrap_or_else(|| open.to_owned());
-            Some(format!("{}={name}:{unit}", guess.role.in_mapping()?))
-        };
-        used.iter().filter(|(guess, _)| with(guess)).filter_map(entry).collect::<Vec<_>>().join(",")
+        let used = guesses.iter().filter(|guess| guess.column.used && with(guess));
+        used.map(Guess::entry).collect::<Vec<_>>().join(",")
     };
-    let open = used.iter().filter(|(guess, _)| is_open(guess)).count();
+    let open = guesses.iter().filter(|guess| guess.column.used && is_open(guess)).count();
     if open > 0 {
-        let entries = entries(&|guess| guess.role.is_angle() || is_open(guess));
+        let entries = entries(&|guess| guess.column.role.is_angle() || is_open(guess));
         let which = if open == 1 { "that column" } else { "these columns" };
         let (what, word) = if entries.contains("UNIT") { ("unit", "UNIT") } else { ("counts of a turn", "COUNTS") };
         notes.push(format!("give the {what} of {which} in place of {word}: --columns {entries}"));
         return None;
     }
-    if has(Role::Generator) && (has(Role::Output) || has(Role::Error)) {
+    let [generator, output, error] =
+        [Role::Generator, Role::Output, Role::Error].map(|role| used(guesses, role).is_some());
+    if generator && (output || error) {
         return Some(entries(&|_| true));
     }
     // The column of a role by its name, in use or not.
-    let named = |role: Role| guesses.iter().zip(names).find(|(guess, _)| guess.role == role && guess.moves());
+    let named = |role: Role| guesses.iter().find(|guess| guess.column.role == role && guess.moves());
     let entry = |role: Role| {
-        let unit = named(role).filter(|(guess, _)| guess.used).and_then(|(guess, _)| guess.written());
-        let name = named(role).map_or("NAME", |(_, name)| name);
-        format!("{name}:{}", unit.unwrap_or_else(|| "UNIT".to_owned()))
+        let unit = used(guesses, role).and_then(Guess::written).unwrap_or_else(|| "UNIT".to_owned());
+        format!("{}:{unit}", named(role).map_or("NAME", |guess| &guess.name))
     };
-    let what = match (has(Role::Generator), has(Role::Output) || has(Role::Error)) {
-        (true, false) if named(Role::Output).is_some() => {
-            "the column that is called an output does not follow the generator as one, in its unit"
-        }
-        (true, false) => "which column is the output (or the error) is not known",
-        (false, true) => "which column is the generator is not known",
-        _ => "which columns are generator and output is not known",
+    let what = if generator && named(Role::Output).is_some() {
+        "the column that is called an output does not follow the generator as one, in its unit"
+    } else {
+        "which columns are generator and output is not known"
     };
     let (generator, output) = (entry(Role::Generator), entry(Role::Output));
     notes.push(format!("{what}: name them, --columns generator={generator},output={output}"));

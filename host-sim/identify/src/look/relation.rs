@@ -9,11 +9,11 @@ use crate::measurement::{LineFit, least_and_most, rms};
 const LOOKED_AT: usize = 4000;
 /// Two columns turn together if what a straight line leaves is below this share of the range of the second.
 const TOGETHER: f64 = 5e-3;
-/// Counts of a turn are a power of two or a round number to this: one encoder against another on the same shaft,
-/// eccentric by an arc-minute.
+/// Counts of a turn are a power of two to this: one encoder against another on the same shaft, eccentric by an
+/// arc-minute.
 const SAME_COUNT: f64 = 1e-4;
-/// Incremental encoders have round numbers of counts, up to this; of larger numbers nearly each is near a round one.
-const MOST_ROUND: f64 = 1e6;
+/// Counts that a turn may have. *Guess*: encoders of 6 to 32 bits.
+const COUNTS_OF_A_TURN: std::ops::RangeInclusive<f64> = 64.0..=4_294_967_296.0;
 /// Ratios of strain wave gears, and a little more.
 pub(super) const RATIOS: [f64; 2] = [20.0, 400.0];
 /// A torque is believed to turn the error one way if it explains this share of what the turn of the output leaves.
@@ -63,19 +63,13 @@ impl Slope {
     }
 }
 
-/// Counts of a turn, from counts over an angle in rad: the power of two that they nearly are, or the round number of an
-/// incremental encoder; and how far off, as a share.
-pub(super) fn counts_of_a_turn(per_rad: f64, round: bool) -> Option<(f64, f64)> {
+/// Counts of a turn, from counts over an angle in rad: the power of two that they nearly are; and how far off, as a
+/// share.
+pub(super) fn counts_of_a_turn(per_rad: f64) -> Option<(f64, f64)> {
     let counts = (per_rad * TAU).abs();
-    let near = if round {
-        let power = 10f64.powf(counts.log10().floor() - 1.0);
-        (counts / power).round() * power
-    } else {
-        2f64.powf(counts.log2().round())
-    };
+    let near = 2f64.powf(counts.log2().round());
     let off = (counts / near - 1.0).abs();
-    let most = if round { MOST_ROUND } else { 2f64.powi(32) };
-    ((64.0..=most).contains(&near) && off < SAME_COUNT).then_some((near, off))
+    (COUNTS_OF_A_TURN.contains(&near) && off < SAME_COUNT).then_some((near, off))
 }
 
 /// Which way a torque turns the error.
@@ -102,8 +96,8 @@ pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file
     rows.iter_mut().for_each(|row| row[1] -= row[0]);
     let mut files: Vec<f64> = rows.iter().map(|row| row[3]).collect();
     files.dedup();
-    let travel = least_and_most(rows.iter().map(|row| row[1]));
-    let turns = (travel.1 - travel.0) / TAU;
+    let (least, most) = least_and_most(rows.iter().map(|row| row[1]));
+    let turns = (most - least) / TAU;
     let scale = rows.iter().map(|row| row[2].abs()).fold(0.0, f64::max);
     if !(rows.len() > 40 && scale > 0.0) {
         return None;
@@ -155,10 +149,8 @@ mod tests {
         assert!(!slope(&out_again, &motor_again, &one).unwrap().holds());
         let found_again = slope(&out_again, &motor_again, &two).unwrap();
         assert!(found_again.holds() && (found_again.slope / found.slope - 1.0).abs() < 1e-3, "{found_again:?}");
-        let counts = |of: f64, round: bool| counts_of_a_turn(of / TAU, round).map(|(counts, _)| counts);
-        assert_eq!(counts(-65_536.0, false), Some(65_536.0));
-        assert_eq!((counts(20_000.1, false), counts(20_000.1, true)), (None, Some(20_000.0)));
-        assert_eq!((counts(20_777.0, true), counts(2.7e8, true)), (None, None));
+        let counts = |of: f64| counts_of_a_turn(of / TAU).map(|(counts, _)| counts);
+        assert_eq!((counts(-65_536.0), counts(20_000.1), counts(2.7e8)), (Some(65_536.0), None, None));
         let noise: Vec<f64> = (0..3000).map(|k| f64::from((k * 7919) % 3001)).collect();
         assert!(!slope(&noise, &motor, &one).unwrap().holds());
     }

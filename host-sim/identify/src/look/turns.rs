@@ -8,10 +8,6 @@ use crate::measurement::{Unit, registers};
 
 /// A ratio this close to a half is taken for one: a guess.
 const CLOSE_TO_HALF: f64 = 0.1;
-/// A ratio is whole to this: clearance and the error of the ratio that few turns leave. *Guess*.
-const WHOLE: f64 = 0.005;
-/// Counts of a turn that are tried, powers of two.
-const POWERS: std::ops::RangeInclusive<i32> = 6..=28;
 /// Two columns show one shaft if a straight line leaves less than this share of the range.
 const SAME_SHAFT: f64 = 1e-4;
 
@@ -25,79 +21,39 @@ pub(super) fn proposed_ratio(found: f64) -> f64 {
 pub(super) fn units_of_counts(guesses: &mut [Guess]) {
     for k in 0..guesses.len() {
         let counted = &guesses[k];
-        if counted.unit != Some(Unit::Count) || counted.counts.is_some() || !counted.moves() {
+        if counted.unit != Some(Unit::Count) || !counted.moves() {
             continue;
         }
-        let readings = (0..guesses.len()).flat_map(|j| {
-            let other = &guesses[j];
-            let angle = !matches!(other.role, Role::Time | Role::Speed | Role::Torque | Role::Current)
+        let readings = guesses.iter().enumerate().flat_map(|(j, other)| {
+            let angle = !matches!(other.column.role, Role::Time | Role::Speed | Role::Torque | Role::Current)
                 && other.unit != Some(Unit::Count)
                 && !other.facts.whole;
             let line = (j != k && angle && other.moves()).then(|| on_one_shaft(counted, other)).flatten();
             let units = other.unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
-            let forms = units.into_iter().flat_map(|unit| [(unit, false), (unit, true)]);
-            forms.filter_map(move |(unit, round)| {
-                let (counts, off) = counts_of_a_turn(line?.slope / unit.factor(), round)?;
-                Some((round, off, j, unit, counts))
+            units.into_iter().filter_map(move |unit| {
+                let (counts, off) = counts_of_a_turn(line?.slope / unit.factor())?;
+                Some((off, j, unit, counts))
             })
         });
-        // A power of two before a round number, then what fits better.
-        let best = readings.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        if let Some((_, _, j, unit, counts)) = best {
-            guesses[k].counts = Some(counts);
-            guesses[k]
-                .why
-                .push(format!("{counts} counts a turn by column {}, which shows the same shaft in {unit}", j + 1));
+        let best = readings.min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, j, unit, counts)) = best {
+            guesses[k].column.counts_per_turn = Some(counts);
+            let why = format!("{counts} counts a turn by column {}, which shows the same shaft in {unit}", j + 1);
+            guesses[k].column.why.push(why);
             guesses[j].unit = Some(unit);
-            guesses[j].why.push(format!("{unit} by column {}: then a turn has {counts} counts", k + 1));
+            let why = format!("{unit} by column {}: then a turn has {counts} counts", k + 1);
+            guesses[j].column.why.push(why);
         }
     }
 }
 
 /// The line between two columns that show one shaft; names of motor and output, or of two joints, do not.
 pub(super) fn on_one_shaft(a: &Guess, b: &Guess) -> Option<Slope> {
-    let shafts = [a.role, b.role];
+    let shafts = [a.column.role, b.column.role];
     let two_shafts = shafts.contains(&Role::Generator) && shafts.contains(&Role::Output);
     let two_joints = a.said.joint.zip(b.said.joint).is_some_and(|(a, b)| a != b);
     let line = || slope(&a.values, &b.values, &a.of_file);
     (!two_shafts && !two_joints).then(line).flatten().filter(|line| line.left < SAME_SHAFT)
-}
-
-/// The unit of an angle as it may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct UnitReading {
-    /// Unit.
-    pub unit: Unit,
-    /// Counts of a turn, where it is counts and their number is known.
-    pub counts: Option<f64>,
-    /// Where it comes from.
-    pub by: UnitFrom,
-}
-
-/// Where a unit comes from, the surest first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum UnitFrom {
-    /// It was known before.
-    Known,
-    /// The number after which the column begins anew.
-    Anew,
-    /// The other encoder has these counts.
-    Other,
-    /// Nothing: radians, or counts that nobody says.
-    Nothing,
-    /// It makes the ratio one of a strain wave gear, and for counts nearly whole: to be asked where several do.
-    Ratio,
-}
-
-impl UnitReading {
-    fn rad(&self) -> f64 {
-        rad(self.unit, self.counts).unwrap_or(TAU)
-    }
-
-    /// As a mapping takes it.
-    pub fn written(&self) -> Option<String> {
-        written(self.unit, self.counts)
-    }
 }
 
 /// Size of one of a unit of angle, rad; nothing for counts of which none knows how many make a turn.
@@ -114,95 +70,79 @@ pub(super) fn written(unit: Unit, counts: Option<f64>) -> Option<String> {
     }
 }
 
-/// Units of generator and output, and the ratio that they give.
+/// The unit of an angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct AngleUnit {
+    /// Unit; `None` if it has to be asked.
+    pub unit: Option<Unit>,
+    /// Counts of a turn, where it is counts and their number is known.
+    pub counts: Option<f64>,
+    /// Why, where it was not known before.
+    why: &'static str,
+}
+
+impl AngleUnit {
+    /// As a mapping takes it.
+    pub fn written(&self) -> Option<String> {
+        written(self.unit?, self.counts)
+    }
+}
+
+/// Units of generator and output, and the ratio that they give, where they are known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Units {
-    pub generator: UnitReading,
-    pub output: UnitReading,
-    pub ratio: f64,
+    pub generator: AngleUnit,
+    pub output: AngleUnit,
+    pub ratio: Option<f64>,
 }
 
-impl Units {
-    /// How sure the less sure of the two units is.
-    fn by(&self) -> UnitFrom {
-        self.generator.by.max(self.output.by)
-    }
+/// The units of two columns as generator and output; `raw` is the change of the generator's number for one of the
+/// output's. None if the ratio is not one of a strain wave gear.
+pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Option<Units> {
+    let [generator, output] = [unit_of(generator, output), unit_of(output, generator)];
+    let ratio = match [generator, output].map(|of| rad(of.unit?, of.counts)) {
+        [Some(g), Some(o)] => Some(raw * g / o),
+        // Both are counts, of encoders that are taken to be alike.
+        [None, None] => Some(raw),
+        _ => None,
+    };
+    let fits = ratio.is_none_or(|ratio| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs()));
+    fits.then_some(Units { generator, output, ratio })
 }
 
-/// The units that two columns may have as generator and output, as sure as any; `raw` is the change of the generator's
-/// number for one of the output's. None if no unit makes it the ratio of a strain wave gear.
-pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Vec<Units> {
-    let mut all: Vec<Units> = Vec::new();
-    for g in readings(generator, output) {
-        for o in readings(output, generator) {
-            let ratio = raw * g.rad() / o.rad();
-            let whole = (ratio - ratio.round()).abs() < WHOLE * ratio.abs();
-            let by_ratio = |reading: &UnitReading| {
-                reading.unit == Unit::Count && matches!(reading.by, UnitFrom::Ratio | UnitFrom::Other)
-            };
-            let within = (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
-            if within && (whole || !(by_ratio(&g) || by_ratio(&o))) {
-                all.push(Units { generator: g, output: o, ratio });
-            }
+/// The unit of a column together with another one: radians, or the same counts, where the file does not say it.
+fn unit_of(guess: &Guess, other: &Guess) -> AngleUnit {
+    let known = |guess: &Guess| guess.column.counts_per_turn.map(|counts| (counts, ""));
+    let anew = |guess: &Guess| {
+        let span = guess.facts.anew.map(|anew| anew.span).filter(|_| guess.unit == Some(Unit::Count))?;
+        registers().any(|register| register == span).then_some((span, "after which it begins anew"))
+    };
+    let same = || known(other).or_else(|| anew(other)).map(|(counts, _)| (counts, "as the other encoder has"));
+    match guess.unit {
+        Some(Unit::Count) => {
+            let counts = known(guess).or_else(|| anew(guess)).or_else(same);
+            AngleUnit { unit: guess.unit, counts: counts.map(|of| of.0), why: counts.map_or("", |of| of.1) }
         }
-    }
-    let surest = all.iter().map(Units::by).min();
-    all.retain(|units| Some(units.by()) == surest);
-    all
-}
-
-/// Counts of a turn as those after which a register begins anew.
-fn anew(guess: &Guess) -> Option<UnitReading> {
-    let span = guess.facts.anew.map(|anew| anew.span).filter(|_| guess.unit == Some(Unit::Count))?;
-    let reading = UnitReading { unit: Unit::Count, counts: Some(span), by: UnitFrom::Anew };
-    registers().any(|register| register == span).then_some(reading)
-}
-
-/// The units that a column may have together with another one; the same unit, where nothing is known of either.
-fn readings(guess: &Guess, other: &Guess) -> Vec<UnitReading> {
-    let open = |guess: &Guess| guess.rad().is_none() && anew(guess).is_none();
-    let unit = guess.unit.unwrap_or(Unit::Radian);
-    match (guess.unit, guess.counts) {
-        _ if open(guess) && open(other) && guess.unit == other.unit => {
-            vec![UnitReading { unit, counts: None, by: UnitFrom::Nothing }]
+        None if other.unit.is_none_or(|unit| unit == Unit::Count) => {
+            AngleUnit { unit: Some(Unit::Radian), counts: None, why: "for want of a unit" }
         }
-        (Some(Unit::Count), None) => {
-            let same = other.counts.or_else(|| anew(other).and_then(|reading| reading.counts));
-            let same = same.map(|counts| UnitReading { unit, counts: Some(counts), by: UnitFrom::Other });
-            let powers = POWERS.map(|bits| UnitReading { unit, counts: Some(2f64.powi(bits)), by: UnitFrom::Ratio });
-            anew(guess).into_iter().chain(same).chain(powers).collect()
-        }
-        (None, _) if other.unit == Some(Unit::Count) && other.counts.is_none() => {
-            vec![UnitReading { unit, counts: None, by: UnitFrom::Nothing }]
-        }
-        (None, _) => Unit::ANGLES.map(|unit| UnitReading { unit, counts: None, by: UnitFrom::Ratio }).to_vec(),
-        (Some(unit), counts) => vec![UnitReading { unit, counts, by: UnitFrom::Known }],
+        unit => AngleUnit { unit, counts: None, why: "" },
     }
 }
 
 /// Gives a column of a pair its unit, with why; `place` is its place in the file, from 0.
-pub(super) fn settle(guess: &mut Guess, place: usize, reading: &UnitReading, ratio: f64, notes: &mut Vec<String>) {
-    let open = guess.rad().is_none();
-    (guess.unit, guess.counts) = (Some(reading.unit), reading.counts);
-    if !open {
-        return;
-    }
-    let why = match (reading.unit, reading.counts, reading.by) {
-        (Unit::Count, Some(counts), by) => {
-            let why = match by {
-                UnitFrom::Anew => "after which it begins anew",
-                UnitFrom::Other => "as the other encoder has",
-                _ => "which makes the ratio nearly whole",
-            };
-            notes.push(format!("column {}: {counts} counts a turn, {why}: check it", place + 1));
-            format!("{counts} counts a turn, {why}")
-        }
-        (Unit::Count, None, _) => {
+pub(super) fn settle(guess: &mut Guess, place: usize, found: &AngleUnit, notes: &mut Vec<String>) {
+    (guess.unit, guess.column.counts_per_turn) = (found.unit, found.counts);
+    match (found.unit, found.counts) {
+        (Some(Unit::Count), None) => {
             notes.push(format!("how many counts make a turn of column {} is not in the file", place + 1));
-            return;
         }
-        (unit, _, UnitFrom::Nothing) => format!("{unit}, for want of a unit"),
-        (unit, ..) => format!("{unit} makes the ratio {ratio:.2}"),
-    };
-    guess.why.push(why);
+        (Some(Unit::Count), Some(counts)) if !found.why.is_empty() => {
+            let why = format!("{counts} counts a turn, {}", found.why);
+            notes.push(format!("column {}: {why}: check it", place + 1));
+            guess.column.why.push(why);
+        }
+        (Some(unit), None) if !found.why.is_empty() => guess.column.why.push(format!("{unit}, {}", found.why)),
+        _ => {}
+    }
 }
