@@ -64,23 +64,21 @@ pub(super) fn stands(sections: &[Pointing], ratio: f64) -> (Vec<f64>, Vec<String
         target.offset += shorter(axis - clock(section) - target.offset) / target.sections;
         of.push(Some((place, axis)));
     }
-    let mut stands: Vec<Option<f64>> = sections
-        .iter()
-        .zip(&of)
-        .map(|(section, of)| of.map(|(place, axis)| axis + shorter(targets[place].offset - (axis - clock(section)))))
-        .collect();
+    let said = |(section, of): (&Pointing, &Option<(usize, f64)>)| {
+        of.map(|(place, axis)| axis + shorter(targets[place].offset - (axis - clock(section))))
+    };
+    let said: Vec<Option<f64>> = sections.iter().zip(&of).map(said).collect();
     // What says nothing goes on with the section before it; what comes before all that say something, with the first of
     // them.
-    let known = stands.iter().position(Option::is_some);
-    let first = known.unwrap_or(0);
-    let begins = |k: usize| sections.get(k).map_or(0.0, clock);
-    let mut last = (stands.get(first).copied().flatten().unwrap_or(begins(first).rem_euclid(1.0)), begins(first));
-    for k in (0..first).chain(first..sections.len()) {
-        let here = *stands[k].get_or_insert(last.0 + begins(k) - last.1);
-        if k >= first {
-            last = (here, begins(k));
-        }
-    }
+    let known = said.iter().position(Option::is_some);
+    let first = sections.get(known.unwrap_or(0)).map_or(0.0, clock);
+    let mut last = (known.and_then(|known| said[known]).unwrap_or(first.rem_euclid(1.0)), first);
+    let stand = |(section, said): (&Pointing, Option<f64>)| {
+        let here = said.unwrap_or(last.0 + clock(section) - last.1);
+        last = said.map_or(last, |said| (said, clock(section)));
+        here
+    };
+    let stands = sections.iter().zip(said).map(stand).collect();
     let mut notes = Vec::new();
     if known.is_none() {
         notes.push(
@@ -99,7 +97,7 @@ pub(super) fn stands(sections: &[Pointing], ratio: f64) -> (Vec<f64>, Vec<String
             if flipped { "; on the other side of the pier the axis is taken half a turn farther" } else { "" }
         ));
     }
-    (stands.into_iter().flatten().collect(), notes)
+    (stands, notes)
 }
 
 #[cfg(test)]

@@ -35,11 +35,6 @@ const SIDEREAL_DAY_S: f64 = 86_164.090_5;
 const HIGHEST_DECLINATION_DEG: f64 = 80.0;
 /// Columns of a row, by the names of its header.
 const COLUMNS: [&str; 6] = ["Time", "mount", "RARawDistance", "RADuration", "RADirection", "ErrorCode"];
-/// A clock that is set back is set by whole hours (summer time, a zone), unless by less than this, s. *Guess*.
-const SET_RIGHT_S: f64 = 60.0;
-/// Seconds of an hour, by definition.
-const HOUR_S: f64 = 3600.0;
-
 /// Whether a file that begins so is a guide log.
 pub(super) fn is_one(head: &[u8]) -> bool {
     let first = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
@@ -59,8 +54,8 @@ struct GuideSection {
     /// Pixels in the sky for a second of a pulse, and arc-seconds of the axis.
     x_rate: Option<f64>,
     guide_speed: Option<f64>,
-    /// The columns of its table, and where those of [`COLUMNS`] stand.
-    table: Option<(Header, [Option<usize>; COLUMNS.len()])>,
+    /// Where [`COLUMNS`] stand in its table.
+    table: Option<Header<{ COLUMNS.len() }>>,
     /// Angle by which pulses have set the axis forward, arcsec.
     sent_arcsec: f64,
     frames: Vec<Frame>,
@@ -84,11 +79,6 @@ struct Frame {
 }
 
 impl GuideSection {
-    /// When the last row of it was recorded, s.
-    fn ends_s(&self) -> f64 {
-        self.pointing.begins_s + self.frames.last().map_or(0.0, |frame| frame.time_s)
-    }
-
     /// Takes what a line above the rows says.
     fn learn(&mut self, line: &str) {
         let value = |word: &str, units: &[&str]| said(line, word, units).map(|written| written.value);
@@ -106,7 +96,7 @@ impl GuideSection {
 
     /// Takes a row; says what of the section does not allow it.
     fn take(&mut self, line: &str, number_of_line: u64, session: u32) -> Result<(), TableProblem> {
-        let Some((header, places)) = &self.table else { return Ok(()) };
+        let Some(header) = &self.table else { return Ok(()) };
         if !line.trim_start_matches('"').starts_with(|first: char| first.is_ascii_digit()) {
             return Ok(());
         }
@@ -114,10 +104,9 @@ impl GuideSection {
         let fields = header.fields(line).ok_or_else(|| {
             problem("more fields than names; allowed: decimals behind a point, or behind a comma in quotes".to_owned())
         })?;
-        let field = |k: usize| places[k].and_then(|place| fields.get(place)).map_or("", String::as_str);
-        let number_of = |k: usize| number(field(k));
-        let of_a_star = field(1).eq_ignore_ascii_case("mount") && number_of(5).is_none_or(|code| code == 0.0);
-        let (Some(time_s), Some(distance), true) = (number_of(0), number_of(2), of_a_star) else {
+        let [time_s, mount, distance, duration, direction, error] = &fields;
+        let of_a_star = mount.eq_ignore_ascii_case("mount") && number(error).is_none_or(|code| code == 0.0);
+        let (Some(time_s), Some(distance), true) = (number(time_s), number(distance), of_a_star) else {
             self.lost += 1;
             return Ok(());
         };
@@ -132,12 +121,6 @@ impl GuideSection {
             return Err(problem(format!("declination: found {declination} deg, allowed: -{most} to {most}")));
         }
         let of_axis = scale / declination.to_radians().cos();
-        let duration_s = 1e-3 * number_of(3).unwrap_or(0.0).abs();
-        let forward = match field(4).to_ascii_uppercase().chars().next() {
-            Some('W') => 1.0,
-            Some('E') => -1.0,
-            _ => 0.0,
-        };
         self.frames.push(Frame {
             line: number_of_line,
             session,
@@ -145,18 +128,22 @@ impl GuideSection {
             distance: distance * of_axis,
             sent: self.sent_arcsec,
         });
-        if duration_s > 0.0 && forward != 0.0 {
-            let rate = self.x_rate.map(|rate| rate * of_axis).or(self.guide_speed).ok_or_else(|| {
-                problem(
-                    "a pulse, but neither \"xRate = ...\" nor \"RA Guide Speed = ...\" above; allowed: a log that \
-                     says its guide rate"
-                        .to_owned(),
-                )
-            })?;
-            self.sent_arcsec += forward * duration_s * rate;
-            self.pulses += 1;
-            self.west_of_positive += if (distance > 0.0) == (forward > 0.0) { 1 } else { -1 };
-        }
+        let duration_s = 1e-3 * number(duration).unwrap_or(0.0).abs();
+        let forward = match direction.to_ascii_uppercase().chars().next() {
+            Some('W') if duration_s > 0.0 => 1.0,
+            Some('E') if duration_s > 0.0 => -1.0,
+            _ => return Ok(()),
+        };
+        let rate = self.x_rate.map(|rate| rate * of_axis).or(self.guide_speed).ok_or_else(|| {
+            problem(
+                "a pulse, but neither \"xRate = ...\" nor \"RA Guide Speed = ...\" above; allowed: a log that says \
+                 its guide rate"
+                    .to_owned(),
+            )
+        })?;
+        self.sent_arcsec += forward * duration_s * rate;
+        self.pulses += 1;
+        self.west_of_positive += if (distance > 0.0) == (forward > 0.0) { 1 } else { -1 };
         Ok(())
     }
 }
@@ -185,9 +172,8 @@ pub(super) fn read(source: impl Read, ratio: f64) -> Result<(Log, Vec<String>), 
             // The star is held elsewhere.
             session += 1;
             section.sent_arcsec = 0.0;
-        } else if let Some(header) = Header::of(line) {
-            let places = COLUMNS.map(|column| header.place(column));
-            section.table = Some((header, places));
+        } else if let Some(header) = Header::of(line, COLUMNS) {
+            section.table = Some(header);
         } else if section.table.is_none() {
             section.learn(line);
         } else if section.problem.is_none() {
@@ -206,31 +192,18 @@ pub(super) fn read(source: impl Read, ratio: f64) -> Result<(Log, Vec<String>), 
     if let Some(problem) = first_problem.filter(|_| sections.iter().all(|section| section.frames.is_empty())) {
         return Err(problem);
     }
-    notes.extend(clock_runs_on(&mut sections));
+    let back = sections.windows(2).find(|pair| pair[1].pointing.begins_s < pair[0].pointing.begins_s);
+    if let Some([_, section]) = back
+        && sections.iter().all(|section| section.pointing.hour_angle.is_none())
+    {
+        let what =
+            "the clock is set back, and no hour angle says where the axis stands; allowed: a file for each clock";
+        return Err(TableProblem { line: section.line, what: what.to_owned() });
+    }
     let pointings: Vec<Pointing> = sections.iter().map(|section| section.pointing).collect();
     let (stands, of_axis) = axis::stands(&pointings, ratio);
     notes.extend(of_axis);
     Ok(of_sections(&sections, &stands, ratio, notes))
-}
-
-/// Sets the clock forward where it was set back within the night; says where.
-fn clock_runs_on(sections: &mut [GuideSection]) -> Option<String> {
-    let (mut ahead_s, mut last_s, mut first) = (0.0, f64::NEG_INFINITY, None);
-    for section in sections {
-        section.pointing.begins_s += ahead_s;
-        let back_s = last_s - section.pointing.begins_s;
-        if back_s > 0.0 {
-            let by_s = if back_s < SET_RIGHT_S { back_s } else { HOUR_S * (back_s / HOUR_S).ceil() };
-            section.pointing.begins_s += by_s;
-            if by_s >= HOUR_S {
-                ahead_s += by_s;
-                first.get_or_insert((section.line, by_s / HOUR_S));
-            }
-        }
-        last_s = section.ends_s();
-    }
-    let (line, hours) = first?;
-    Some(format!("the clock is set back before line {line}: times are taken {hours} h later from there on"))
 }
 
 /// The rows of all sections as one log.

@@ -303,28 +303,13 @@ fn decimal_commas_are_read_as_points_unless_commas_part_the_fields() {
 }
 
 #[test]
-fn a_clock_that_is_set_back_within_the_night_is_set_forward() {
-    let with_hour_angle =
-        slewed("2026-11-01 20:50:00", "Dec = 35.0 deg, Hour angle = 2.50 hr", 1.0 + 5400.0 * HOURS_A_S);
-    let without = Part { pointing: "Dec = 35.0 deg, Hour angle = N/A hr", ..with_hour_angle };
+fn a_clock_that_is_set_back_within_the_night_needs_an_hour_angle() {
     let end_of_summer = Part { rows: 1800, begins: "2026-11-01 20:20:00", ..PART };
-    for (first, second) in [
-        (end_of_summer, with_hour_angle),
-        (Part { pointing: without.pointing, ..end_of_summer }, without),
-        // To a clock that is a day and three hours behind.
-        (end_of_summer, Part { begins: "2026-10-31 18:50:00", ..with_hour_angle }),
-    ] {
-        let recording = read_night(&night(&[first, second]));
-        assert_eq!(recording.sessions.len(), 2);
-        assert!(recording.faults.is_empty(), "{:?}", recording.faults);
-        assert!(recording.notes.iter().any(|note| note.contains("the clock is set back")), "{:?}", recording.notes);
-        let times: Vec<f64> = recording.sessions.iter().map(|session| session.time_s.as_ref().unwrap()[0]).collect();
-        assert!((times[1] - times[0] - 5400.0).abs() < 1e-6, "{times:?}");
-        assert_one_wave(&[recording], AMPLITUDE, 0.1);
-    }
-    // A clock that a server sets right by a second is not set back by an hour.
-    let soon = slewed("2026-11-01 21:19:57", "Dec = 35.0 deg, Hour angle = 2.00 hr", 1.0 + 3598.0 * HOURS_A_S);
-    let recording = read_night(&night(&[end_of_summer, soon]));
-    assert!(!recording.notes.iter().any(|note| note.contains("set back")), "{:?}", recording.notes);
-    assert_one_wave(&[recording], AMPLITUDE, 0.2);
+    let with_hour_angle = slewed("2026-11-01 20:10:00", "Dec = 35.0 deg, Hour angle = 2.50 hr", 2.5);
+    let recording = read_night(&night(&[end_of_summer, with_hour_angle]));
+    assert_eq!(recording.sessions.len(), 2);
+    assert_one_wave(&[recording], AMPLITUDE, 0.1);
+    let without = |part: Part<'static>| Part { pointing: "Dec = 35.0 deg, Hour angle = N/A", ..part };
+    let refused = try_night(&night(&[without(end_of_summer), without(with_hour_angle)])).unwrap_err().to_string();
+    assert!(refused.contains("the clock is set back") && refused.contains("a file for each clock"), "{refused}");
 }

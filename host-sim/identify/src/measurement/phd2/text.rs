@@ -51,32 +51,31 @@ pub(super) fn number(text: &str) -> Option<f64> {
     parsed.ok().filter(|value| value.is_finite())
 }
 
-/// The names of a table's columns, and what parts its fields.
+/// The columns of a table of rows.
 #[derive(Clone, Debug)]
-pub(super) struct Header {
+pub(super) struct Header<const N: usize> {
     separator: char,
-    names: Vec<String>,
+    width: usize,
+    places: [Option<usize>; N],
 }
 
-impl Header {
-    /// Of a line that begins with the column `Frame`.
-    pub fn of(line: &str) -> Option<Header> {
+impl<const N: usize> Header<N> {
+    /// Of a line that begins with the column `Frame`; `names` are the columns in use.
+    pub fn of(line: &str, names: [&str; N]) -> Option<Header<N>> {
         let rest = line.trim_start_matches('"').strip_prefix("Frame")?.trim_start_matches('"');
         let separator = rest.chars().next().filter(|c| SEPARATORS.contains(c))?;
-        Some(Header { separator, names: split(line, separator) })
+        let all = split(line, separator);
+        let places = names.map(|name| all.iter().position(|known| known == name));
+        Some(Header { separator, width: all.len(), places })
     }
 
-    /// Where a column stands.
-    pub fn place(&self, name: &str) -> Option<usize> {
-        self.names.iter().position(|known| known == name)
-    }
-
-    /// The fields of a row, each under its name; none where there are more than the names allow, as numbers with
-    /// decimal commas between commas make them.
-    pub fn fields(&self, line: &str) -> Option<Vec<String>> {
+    /// The fields of the columns in use, empty where there is none; `None` where there are more than the names allow,
+    /// as numbers with decimal commas between commas make them.
+    pub fn fields(&self, line: &str) -> Option<[String; N]> {
         let fields = split(line, self.separator);
         // One more than names says why a star was lost.
-        (fields.len() <= self.names.len() + 1).then_some(fields)
+        let field = |place: Option<usize>| place.and_then(|place| fields.get(place).cloned()).unwrap_or_default();
+        (fields.len() <= self.width + 1).then(|| self.places.map(field))
     }
 }
 
@@ -118,18 +117,19 @@ mod tests {
     #[test]
     fn fields_are_parted_whatever_decimals_are_written_with() {
         let names = "Frame,Time,mount,dx,RARawDistance,RADuration,RADirection,StarMass,SNR,ErrorCode";
-        let plain = ["7", "2.093", "Mount", "-0.5", "0.15", "108", "W", "1702", "28.36", "0"];
-        let header = Header::of(names).unwrap();
+        let used = ["Time", "RARawDistance", "RADuration", "RADirection", "ErrorCode", "Absent"];
+        let plain = ["2.093", "0.15", "108", "W", "0", ""];
+        let header = Header::of(names, used).unwrap();
         let fields = |line: &str| header.fields(line);
         assert_eq!(fields("7,2.093,\"Mount\",-0.5,0.15,108,W,1702,28.36,0").unwrap(), plain);
         assert_eq!(fields("7,2,093,\"Mount\",-0,5,0,15,108,W,1702,28,36,0"), None);
         let quoted = fields("7,\"2,093\",Mount,\"-0,5\",\"0,15\",108,W,1702,\"28,36\",0").unwrap();
-        assert_eq!(quoted.iter().filter_map(|field| number(field)).nth(1), Some(2.093));
+        assert_eq!(number(&quoted[0]), Some(2.093));
         let lost = fields("8,3.1,\"DROP\",,,,,0,0.00,3,\"Star lost, low mass\"").unwrap();
-        assert_eq!(lost[9..], ["3", "Star lost, low mass"]);
-        let header = Header::of(&names.replace(',', ";")).unwrap();
+        assert_eq!(lost[4], "3");
+        let header = Header::of(&names.replace(',', ";"), used).unwrap();
         let semicolons = header.fields("7;2,093;Mount;-0,5;0,15;108;W;1702;28,36;0").unwrap();
-        assert_eq!(number(&semicolons[4]), Some(0.15));
-        assert!(Header::of("Frames lost").is_none());
+        assert_eq!(number(&semicolons[1]), Some(0.15));
+        assert!(Header::of("Frames lost", used).is_none());
     }
 }
