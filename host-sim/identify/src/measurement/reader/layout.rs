@@ -42,31 +42,26 @@ pub enum Separator {
 }
 
 impl Separator {
-    /// In the order in which the first of several that fit is taken.
-    const ALL: [Separator; 5] =
-        [Separator::Comma, Separator::Semicolon, Separator::Tab, Separator::Bar, Separator::Blanks];
-
-    /// Its name, and the byte between two fields; of blanks the tab that [`with_tabs`] puts in their place.
-    const fn spec(self) -> (&'static str, u8) {
-        match self {
-            Separator::Comma => ("comma", b','),
-            Separator::Semicolon => ("semicolon", b';'),
-            Separator::Tab => ("tab", b'\t'),
-            Separator::Bar => ("bar", b'|'),
-            Separator::Blanks => ("blanks", b'\t'),
-        }
-    }
+    /// Each in the order of the enum, with its name and the byte between two fields, of blanks the tab that
+    /// [`with_tabs`] puts in their place. Of several that fit the first is taken.
+    const ALL: [(Separator, &'static str, u8); 5] = [
+        (Separator::Comma, "comma", b','),
+        (Separator::Semicolon, "semicolon", b';'),
+        (Separator::Tab, "tab", b'\t'),
+        (Separator::Bar, "bar", b'|'),
+        (Separator::Blanks, "blanks", b'\t'),
+    ];
 
     /// Its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        self.spec().0
+        Separator::ALL[self as usize].1
     }
 
     /// Records of a text; of one with [`Separator::Blanks`] as [`with_tabs`] writes it.
     pub(super) fn records(self, text: &[u8]) -> csv::Reader<&[u8]> {
         let mut form = csv::ReaderBuilder::new();
-        form.delimiter(self.spec().1).has_headers(false).flexible(true).from_reader(text)
+        form.delimiter(Separator::ALL[self as usize].2).has_headers(false).flexible(true).from_reader(text)
     }
 }
 
@@ -162,15 +157,6 @@ struct HeadLine {
     fields: Vec<String>,
 }
 
-/// The head of a file as one separator gives it.
-struct HeadGuess {
-    separator: Separator,
-    lines: Vec<HeadLine>,
-    width: usize,
-    comma: bool,
-    kinds: Vec<CellKind>,
-}
-
 impl Layout {
     /// The layout of a text; `known` are names of columns that are looked for. What is left out is added to `notes`.
     ///
@@ -180,70 +166,58 @@ impl Layout {
         let head = &text[..text.len().min(HEAD)];
         // The last line may be cut.
         let head = &head[..head.iter().rposition(|byte| *byte == b'\n').map_or(head.len(), |end| end + 1)];
-        // Names that are looked for, in the first line with commas, are a header whatever stands below: what does not
-        // fit is for the reader to refuse.
+        if let Some((layout, lines)) = guess(head) {
+            return layout.with_names(head, &lines, known, notes);
+        }
+        // No rows were found: what does not fit below the first line is for the reader to refuse.
         let first = lines(head, Separator::Comma).into_iter().next();
-        let first = first.unwrap_or(HeadLine { number: 1, fields: Vec::new() });
-        let own = first.fields.len() > 1 && first.fields.iter().any(|name| known.contains(&name.as_str()));
-        let guessed = guess(head).map(|guess| Layout::guessed(head, guess, known, notes)).transpose()?;
-        Ok(match guessed {
-            Some(layout) if !own || layout.header_line == first.number => layout,
-            _ => Layout {
-                has_names: true,
-                header_line: first.number,
-                first_row_line: first.number + 1,
-                kinds: vec![CellKind::Number; first.fields.len()],
-                names: first.fields,
-                ..Layout::default()
-            },
-        })
+        let HeadLine { number, fields } = first.unwrap_or(HeadLine { number: 1, fields: Vec::new() });
+        let kinds = vec![CellKind::Number; fields.len()];
+        let (names, header_line, first_row_line) = (fields, number, number + 1);
+        Ok(Layout { has_names: true, header_line, first_row_line, kinds, names, ..Layout::default() })
     }
 
-    fn guessed(head: &[u8], guess: HeadGuess, known: &[&str], notes: &mut Vec<String>) -> Result<Layout, TableProblem> {
-        let HeadGuess { separator, lines, width, comma, kinds } = guess;
-        let row = |line: &HeadLine| is_row(&line.fields, comma) && !begins_with_a_word(&line.fields, &kinds);
-        let full = lines.iter().position(|line| line.fields.len() >= width && row(line)).unwrap_or(0);
-        // Rows of fewer fields above the first of the usual width are rows as well.
-        let shorter = |line: &&HeadLine| line.fields.len() > 1 && row(line) && !has_a_word(&line.fields, comma);
-        let rows_from = full - lines[..full].iter().rev().take_while(shorter).count();
-        let begins = lines[rows_from].number;
-        let mut layout = Layout {
-            separator,
-            decimal_comma: comma,
-            names: (1..=width).map(|k| format!("#{k}")).collect(),
-            header_line: begins,
-            first_row_line: begins,
-            kinds,
-            ..Layout::default()
+    /// With names, units and forms of times by the lines of the head.
+    fn with_names(
+        mut self,
+        head: &[u8],
+        lines: &[HeadLine],
+        known: &[&str],
+        notes: &mut Vec<String>,
+    ) -> Result<Layout, TableProblem> {
+        let width = self.kinds.len();
+        let row = |line: &HeadLine| {
+            is_row(&line.fields, self.decimal_comma) && !begins_with_a_word(&line.fields, &self.kinds)
         };
+        let rows_from = lines.iter().position(|line| line.fields.len() >= width && row(line)).unwrap_or(0);
+        let begins = lines[rows_from].number;
         let (above, rows) = lines.split_at(rows_from);
-        if let Some((line, names)) = layout.find_names(above, width, known, notes)? {
-            (layout.has_names, layout.header_line, layout.names) = (true, line, names);
-        } else if let Some((line, names)) = comment_with_names(head, begins, separator, width) {
-            (layout.has_names, layout.header_line, layout.names) = (true, line, names);
-        }
-        layout.enough_names(rows)?;
-        layout.kinds.resize(layout.names.len().max(width), CellKind::Nothing);
-        layout.find_times(rows, notes);
-        layout.one_instant_a_line(rows)?;
-        Ok(layout)
+        let names = self.find_names(above, known, notes);
+        let names = names.or_else(|| comment_with_names(head, begins, self.separator, width));
+        self.has_names = names.is_some();
+        self.first_row_line = begins;
+        (self.header_line, self.names) =
+            names.unwrap_or_else(|| (begins, (1..=width).map(|k| format!("#{k}")).collect()));
+        self.enough_names(rows)?;
+        self.kinds.resize(self.names.len().max(width), CellKind::Nothing);
+        self.find_times(rows, notes);
+        self.one_instant_a_line(rows)?;
+        Ok(self)
     }
 
     /// The names of the columns above the rows, and the units below them.
     fn find_names(
         &mut self,
         above: &[HeadLine],
-        width: usize,
         known: &[&str],
         notes: &mut Vec<String>,
-    ) -> Result<Option<(u64, Vec<String>)>, TableProblem> {
+    ) -> Option<(u64, Vec<String>)> {
         // A header may lack the name of an empty last field; one that lacks more is refused later.
-        let fits = |k: usize| {
-            let names = above[k].fields.len();
-            names == width || names + 1 == width || (names > 1 && (k == 0 || k + 1 == above.len()))
+        let fits = |k: &usize| {
+            let (names, width) = (above[*k].fields.len(), self.kinds.len());
+            names == width || names + 1 == width || (names > 1 && (*k == 0 || *k + 1 == above.len()))
         };
-        let Some(block) = (0..above.len()).rev().take_while(|k| fits(*k)).last() else { return Ok(None) };
-        let block = &above[block..];
+        let block = &above[(0..above.len()).rev().take_while(fits).last().unwrap_or(above.len())..];
         let candidates: Vec<&HeadLine> = block.iter().filter(|line| looks_like_names(&line.fields)).collect();
         let units = candidates.iter().find(|line| looks_like_units(&line.fields)).filter(|_| candidates.len() > 1);
         let units_line = units.map_or(0, |line| line.number);
@@ -251,46 +225,29 @@ impl Layout {
         let distinct =
             |line: &HeadLine| line.fields.iter().filter(|name| !name.is_empty()).collect::<BTreeSet<_>>().len();
         let of_known = |line: &HeadLine| line.fields.iter().filter(|name| known.contains(&name.as_str())).count();
-        let best = |among: &dyn Fn(&HeadLine) -> bool| {
-            let some = candidates.iter().filter(|line| line.number != units_line && among(line));
-            some.max_by_key(|line| (of_known(line), distinct(line), line.number))
-        };
-        let above_units = units.and_then(|units| best(&|line| line.number < units.number));
-        let Some(names) = above_units.or_else(|| best(&|_| true)) else { return Ok(None) };
-        if let Some(keyed) = block.iter().find(|line| {
-            let keys: Vec<&String> = line.fields.iter().step_by(2).collect();
-            keys.len() > 1 && !keys[0].is_empty() && keys.iter().all(|key| *key == keys[0])
-        }) {
-            return Err(own_times(keyed.number, &keyed.fields));
-        }
+        let names = candidates.iter().filter(|line| line.number != units_line);
+        let names = names.max_by_key(|line| (of_known(line), distinct(line), line.number < units_line, line.number));
+        let names = names?;
         self.units = units.map_or_else(Vec::new, |line| line.fields.clone());
-        let others: Vec<&HeadLine> =
-            block.iter().filter(|line| line.number != names.number && line.number != units_line).collect();
+        let others = block.iter().filter(|line| line.number != names.number && line.number != units_line);
+        let others: Vec<&HeadLine> = others.collect();
         if let (Some(first), Some(last)) = (others.first(), others.last()) {
             let (lines, are) = lines_text(first.number, last.number);
             let words = others.iter().filter_map(|line| line.fields.iter().find(|field| !field.is_empty()));
-            let words = words.map(String::as_str).collect::<Vec<_>>().join(", ");
-            notes.push(format!(
-                "{lines} above the rows {are} neither names nor units ({}): left out",
-                shortened(&words)
-            ));
+            let words = shortened(&words.map(String::as_str).collect::<Vec<_>>().join(", "));
+            notes.push(format!("{lines} above the rows {are} neither names nor units ({words}): left out"));
         }
-        Ok(Some((names.number, names.fields.clone())))
+        Some((names.number, names.fields.clone()))
     }
 
     /// Refuses rows that have more fields than there are names: it is not known which names are whose.
     fn enough_names(&self, rows: &[HeadLine]) -> Result<(), TableProblem> {
         let used = 1 + self.kinds.iter().rposition(|kind| *kind != CellKind::Nothing).unwrap_or(0);
-        if !self.has_names || used <= self.names.len() {
-            return Ok(());
-        }
         let wide = rows.iter().find(|line| line.fields.len() > self.names.len());
-        let Some(HeadLine { number, fields }) = wide else { return Ok(()) };
-        let whole = |text: &String| {
-            let digits = text.trim_start_matches(['-', '+']);
-            !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit())
+        let Some(HeadLine { number, fields }) = wide.filter(|_| self.has_names && used > self.names.len()) else {
+            return Ok(());
         };
-        let torn = self.separator == Separator::Comma && fields.iter().all(whole);
+        let torn = self.separator == Separator::Comma && fields.iter().all(|field| field.parse::<i128>().is_ok());
         let hint = if torn { "numbers are written with a point, not with a comma" } else { "each column has a name" };
         let what = format!("{} fields, but the header has {}; {hint}", fields.len(), self.names.len());
         Err(TableProblem { line: *number, what })
@@ -303,15 +260,15 @@ impl Layout {
         let timed = |k: usize| column(k).filter(|text| CellKind::of(text, self.decimal_comma) == CellKind::Time);
         let form = |k: usize| if self.kinds[k] == CellKind::Time { clock::form(timed(k)) } else { None };
         self.forms = (0..width).map(form).collect();
-        let apart = |k: usize, whole: &str| {
-            format!("the time stands in columns {k} and {}; allowed: one column, in pandas: {whole}", k + 1)
-        };
         let numbers = |k: usize| column(k).filter_map(|text| text.parse::<f64>().ok()).collect::<Vec<f64>>();
         for k in 1..width {
+            let apart = |whole: &str| {
+                format!("the time stands in columns {k} and {}; allowed: one column, in pandas: {whole}", k + 1)
+            };
             if self.kinds[k - 1..=k] == [CellKind::Date, CellKind::Time] {
-                notes.push(apart(k, "pd.to_datetime(df[DATE] + \" \" + df[TIME])") + "; the date is not read");
+                notes.push(apart("pd.to_datetime(df[DATE] + \" \" + df[TIME])") + "; the date is not read");
             } else if let Some(of_a_second) = parts_of_a_second(&numbers(k - 1), &numbers(k)) {
-                let what = apart(k, &format!("df[SECONDS] + df[PARTS] / {of_a_second:e}"));
+                let what = apart(&format!("df[SECONDS] + df[PARTS] / {of_a_second:e}"));
                 notes.push(what.clone());
                 self.whole_seconds = Some((k - 1, what));
             }
@@ -324,12 +281,17 @@ impl Layout {
             let word = name.to_lowercase();
             let word = word.split(['[', '(', '_', ' ', '.']).next().unwrap_or_default();
             let word = word.trim_end_matches(|c: char| c.is_ascii_digit());
-            ["time", "t", "x", "zeit", "timestamp"].contains(&word)
+            ["time", "t", "x", "zeit", "timestamp", "name"].contains(&word)
         };
-        let width = self.names.len();
-        let in_pairs = width >= 4 && width.is_multiple_of(2) && self.has_names;
+        let in_pairs = self.names.len() >= 4 && self.names.len().is_multiple_of(2) && self.has_names;
         if in_pairs && self.names.iter().enumerate().all(|(k, name)| timely(name) == k.is_multiple_of(2)) {
-            return Err(own_times(self.header_line, &self.names));
+            let what = format!(
+                "each channel has a time column of its own ({}); allowed: one time for all, in pandas: \
+                 pd.merge_asof(df[[T1, MOTOR]], df[[T2, JOINT]].dropna(), left_on=T1, right_on=T2, \
+                 direction=\"nearest\").to_csv(FILE)",
+                shortened(&self.names.join(", "))
+            );
+            return Err(TableProblem { line: self.header_line, what });
         }
         let of_kind = |kind: CellKind| (0..self.kinds.len()).filter(|k| self.kinds[*k] == kind).collect::<Vec<_>>();
         let (numbers, times) = (of_kind(CellKind::Number), of_kind(CellKind::Time));
@@ -355,43 +317,20 @@ impl Layout {
 
 /// Whether a column has seconds since 1970 and the next one parts of a second: how many of these make one.
 fn parts_of_a_second(seconds: &[f64], parts: &[f64]) -> Option<f64> {
-    let is_whole = |values: &[f64]| values.iter().all(|value| value.fract() == 0.0);
-    let sound = seconds.len() > 1
-        && seconds.len() == parts.len()
-        && is_whole(seconds)
-        && is_whole(parts)
-        && seconds.iter().all(|s| EPOCH_S.contains(s));
-    let most = parts.iter().copied().fold(0.0, f64::max);
-    let least = parts.iter().copied().fold(f64::INFINITY, f64::min);
     let begins_anew = seconds.windows(2).zip(parts.windows(2)).any(|(s, part)| s[1] > s[0] && part[1] < part[0]);
+    let whole = seconds.iter().chain(parts).all(|value| value.fract() == 0.0);
+    let sound = begins_anew && whole && seconds.iter().all(|s| EPOCH_S.contains(s));
     // The smallest unit of which a second has more than the largest part, if a second is used up.
-    let fits = |parts: &f64| sound && begins_anew && least >= 0.0 && most < *parts && most >= 0.5 * parts;
+    let fits = |of: &f64| {
+        sound && parts.iter().all(|part| (0.0..*of).contains(part)) && parts.iter().any(|part| *part >= 0.5 * of)
+    };
     [1e3, 1e6, 1e9].into_iter().find(fits)
-}
-
-/// Channels with a time column each.
-fn own_times(line: u64, names: &[String]) -> TableProblem {
-    TableProblem {
-        line,
-        what: format!(
-            "each channel has a time column of its own ({}); allowed: one time for all, in pandas: \
-             pd.merge_asof(df[[T1, MOTOR]], df[[T2, JOINT]].dropna(), left_on=T1, right_on=T2, \
-             direction=\"nearest\").to_csv(FILE)",
-            shortened(&names.join(", "))
-        ),
-    }
 }
 
 /// The lines of the head that are neither blank nor comments.
 fn lines(head: &[u8], separator: Separator) -> Vec<HeadLine> {
-    let spread;
-    let head = if separator == Separator::Blanks {
-        spread = with_tabs(head);
-        &spread
-    } else {
-        head
-    };
-    let mut records = separator.records(head);
+    let spread = (separator == Separator::Blanks).then(|| with_tabs(head));
+    let mut records = separator.records(spread.as_deref().unwrap_or(head));
     let mut record = csv::ByteRecord::new();
     let mut lines = Vec::new();
     while let Ok(true) = records.read_byte_record(&mut record) {
@@ -403,10 +342,11 @@ fn lines(head: &[u8], separator: Separator) -> Vec<HeadLine> {
     lines
 }
 
-/// The separator with which most fields are numbers, and what it makes of the head.
-fn guess(head: &[u8]) -> Option<HeadGuess> {
-    let mut best: Option<(f64, HeadGuess)> = None;
-    for separator in Separator::ALL {
+/// The separator with which most fields are numbers, as a layout without names, and the lines that it makes of the
+/// head.
+fn guess(head: &[u8]) -> Option<(Layout, Vec<HeadLine>)> {
+    let mut best: Option<(f64, (Layout, Vec<HeadLine>))> = None;
+    for (separator, ..) in Separator::ALL {
         let lines = lines(head, separator);
         // Behind a preamble, if there is one.
         let some = &lines[lines.len() / 3..];
@@ -419,15 +359,16 @@ fn guess(head: &[u8]) -> Option<HeadGuess> {
         }
         let fields = || even.iter().flat_map(|line| &line.fields);
         let says = |comma: bool| separator != Separator::Comma && fields().any(|f| number::decimals(f) == Some(comma));
-        let comma = says(true) && !says(false);
-        let kinds: Vec<Vec<CellKind>> =
-            (0..width).map(|k| even.iter().map(|line| CellKind::of(&line.fields[k], comma)).collect()).collect();
-        let count = |of: &dyn Fn(CellKind) -> bool| kinds.iter().flatten().filter(|kind| of(**kind)).count();
-        let numbers = count(&|kind| kind != CellKind::Text) as f64 / (width * even.len()) as f64;
-        let some = count(&|kind| kind == CellKind::Number) > 0;
-        if some && numbers >= NUMBERS && best.as_ref().is_none_or(|(share, _)| numbers > share + 1e-9) {
+        let decimal_comma = says(true) && !says(false);
+        let kinds: Vec<Vec<CellKind>> = (0..width)
+            .map(|k| even.iter().map(|line| CellKind::of(&line.fields[k], decimal_comma)).collect())
+            .collect();
+        let words = kinds.iter().flatten().filter(|kind| **kind == CellKind::Text).count();
+        let share = 1.0 - words as f64 / (width * even.len()) as f64;
+        let some = kinds.iter().flatten().any(|kind| *kind == CellKind::Number);
+        if some && share >= NUMBERS && best.as_ref().is_none_or(|(most, _)| share > most + 1e-9) {
             let kinds = kinds.iter().map(|kinds| majority(kinds)).collect();
-            best = Some((numbers, HeadGuess { separator, lines, width, comma, kinds }));
+            best = Some((share, (Layout { separator, decimal_comma, kinds, ..Layout::default() }, lines)));
         }
     }
     best.map(|(_, guess)| guess)
@@ -435,14 +376,10 @@ fn guess(head: &[u8]) -> Option<HeadGuess> {
 
 /// The kind of most cells, of those that hold anything.
 fn majority(kinds: &[CellKind]) -> CellKind {
-    let count = |kind: CellKind| kinds.iter().filter(|other| **other == kind).count();
-    let some =
-        [CellKind::Number, CellKind::Time, CellKind::Date, CellKind::Text].into_iter().map(|kind| (count(kind), kind));
-    // The first of those that are as many.
-    some.rev()
-        .max_by_key(|(count, _)| *count)
-        .filter(|(count, _)| *count > 0)
-        .map_or(CellKind::Nothing, |(_, kind)| kind)
+    let count = |kind: &CellKind| kinds.iter().filter(|other| *other == kind).count();
+    // The last of those that are as many.
+    let most = [CellKind::Text, CellKind::Date, CellKind::Time, CellKind::Number].into_iter().max_by_key(count);
+    most.filter(|kind| count(kind) > 0).unwrap_or(CellKind::Nothing)
 }
 
 /// Whether fields are those of a row of numbers.
@@ -450,10 +387,6 @@ fn is_row(fields: &[String], comma: bool) -> bool {
     let kinds: Vec<CellKind> = fields.iter().map(|field| CellKind::of(field, comma)).collect();
     let text = kinds.iter().filter(|kind| **kind == CellKind::Text).count();
     (kinds.contains(&CellKind::Number) || kinds.contains(&CellKind::Time)) && 2 * text <= kinds.len()
-}
-
-fn has_a_word(fields: &[String], comma: bool) -> bool {
-    fields.iter().any(|field| CellKind::of(field, comma) == CellKind::Text)
 }
 
 /// Whether a line begins with a word where most have a number or a time.
@@ -484,13 +417,11 @@ pub(in crate::measurement) fn unit_word(field: &str) -> &str {
 /// `numpy.savetxt` and gnuplot write the names as a comment.
 fn comment_with_names(head: &[u8], begins: u64, separator: Separator, width: usize) -> Option<(u64, Vec<String>)> {
     let above: Vec<&[u8]> = head.split(|byte| *byte == b'\n').take(begins as usize - 1).collect();
-    let comments = above.iter().enumerate().rev().filter(|(_, line)| line.starts_with(b"#"));
-    let names = comments.map(|(k, line)| {
-        let names = [line.strip_prefix(b"#").unwrap_or(line).trim_ascii(), b"\n"].concat();
-        let names = lines(&names, separator);
-        (k as u64 + 1, names.into_iter().next().map_or_else(Vec::new, |line| line.fields))
-    });
-    names.into_iter().find(|(_, names)| names.len() == width && looks_like_names(names))
+    above.iter().enumerate().rev().find_map(|(k, line)| {
+        let names = [line.strip_prefix(b"#")?.trim_ascii(), b"\n"].concat();
+        let names = lines(&names, separator).pop()?.fields;
+        (names.len() == width && looks_like_names(&names)).then_some((k as u64 + 1, names))
+    })
 }
 
 /// Lines of a file, and the verb that goes with them.

@@ -159,8 +159,7 @@ impl Sheet {
         if let Some(((first, record), (last, _))) = summary.filter(|_| !names) {
             let (lines, are) = lines_text(*first, *last);
             let rows = if first == last { "row" } else { "rows" };
-            let from = texts(record).swap_remove(0);
-            let from = shortened(&from);
+            let from = shortened(&texts(record)[0]);
             read.notes.push(format!("{lines} at the end, from \"{from}\" on, {are} no {rows}: left out"));
         } else {
             self.sort_out(places, &mut wordy, &mut read)?;
@@ -222,8 +221,7 @@ impl Sheet {
         wordy: &mut Vec<(u64, csv::ByteRecord)>,
         read: &mut Columns,
     ) -> Result<(), TableProblem> {
-        let names = wordy.iter().find(|(_, record)| self.has_the_names(record));
-        if let Some((line, _)) = names {
+        if let Some((line, _)) = wordy.iter().find(|(_, record)| self.has_the_names(record)) {
             read.restarts.push(*line);
             wordy.clear();
         }
@@ -231,11 +229,10 @@ impl Sheet {
             let fields = texts(&record);
             let word = |name: &String| looks_like_names(std::slice::from_ref(name));
             if fields.len() > 1 && self.layout.has_names && fields.iter().all(word) {
+                let (names, header) = (shortened(&fields.join(", ")), self.layout.header_line);
                 let what = format!(
-                    "a second line of names ({}), which are not those of line {}; allowed: one form in a file, so \
-                     cut it there",
-                    shortened(&fields.join(", ")),
-                    self.layout.header_line
+                    "a second line of names ({names}), which are not those of line {header}; allowed: one form in a \
+                     file, so cut it there"
                 );
                 return Err(TableProblem { line, what });
             }
@@ -272,14 +269,12 @@ impl Cells {
     /// A sentence on the cells that were beyond the range.
     #[must_use]
     pub(crate) fn over_note(&self, name: &str) -> Option<String> {
-        let first = self.over.first.as_ref()?;
+        let FoundCell { line, text } = self.over.first.as_ref()?;
+        let (count, text) = (self.over.count, shortened(text));
+        let cells = if count == 1 { "cell is" } else { "cells are" };
         Some(format!(
-            "{name}: {} cell{} beyond the range of the instrument, the first in line {} (\"{}\"): nothing is taken to \
-             be recorded there",
-            self.over.count,
-            if self.over.count == 1 { " is" } else { "s are" },
-            first.line,
-            shortened(&first.text)
+            "{name}: {count} {cells} beyond the range of the instrument, the first in line {line} (\"{text}\"): \
+             nothing is taken to be recorded there"
         ))
     }
 }
