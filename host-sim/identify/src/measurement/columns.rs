@@ -175,37 +175,41 @@ impl ColumnMap {
         if let Some(constant) = per_ampere.filter(|constant| !(constant.is_finite() && *constant != 0.0)) {
             return Err(OptionError::TorqueConstant(constant));
         }
-        let default = columns.is_empty().then(ColumnMap::default);
-        let map = default.map_or_else(|| ColumnMap::with_torque_constant(columns, per_ampere), Ok)?;
-        match rate_hz {
-            Some(rate) if !(rate.is_finite() && rate > 0.0) => Err(OptionError::Rate(rate)),
-            _ => Ok(ColumnMap { rate_hz, ..map }),
+        if let Some(rate) = rate_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+            return Err(OptionError::Rate(rate));
         }
+        let given =
+            if columns.is_empty() { Vec::new() } else { ColumnMap::with_torque_constant(columns, per_ampere)?.given };
+        Ok(ColumnMap { given, rate_hz })
     }
 
     fn with_torque_constant(text: &str, per_ampere: Option<f64>) -> Result<ColumnMap, MappingError> {
         let mut map = ColumnMap::default();
         for entry in text.split(',').map(str::trim) {
             let given = given(entry, per_ampere)?;
-            let clash = map.given.iter().find(|other| other.quantity == given.quantity || other.column == given.column);
-            if let Some(before) = clash {
-                let (name, column) = (given.quantity, &given.column);
-                let what = if before.quantity == name {
-                    format!("{name} is there twice")
-                } else {
-                    format!("column {column} stands for both {} and {name}", before.quantity)
-                };
-                return Err(MappingError(what));
+            let (name, column) = (given.quantity, &given.column);
+            match map.given.iter().find(|other| other.quantity == name || other.column == *column) {
+                Some(before) if before.quantity == name => {
+                    return Err(MappingError(format!("{name} is there twice")));
+                }
+                Some(GivenColumn { quantity, .. }) => {
+                    return Err(MappingError(format!("column {column} stands for both {quantity} and {name}")));
+                }
+                None => map.given.push(given),
             }
-            map.given.push(given);
         }
         Ok(map)
     }
 
+    /// The entry of a quantity.
+    fn given(&self, quantity: Quantity) -> Option<&GivenColumn> {
+        self.given.iter().find(|given| given.quantity == quantity)
+    }
+
     /// The column of a quantity, and whether its unit was said.
     pub(crate) fn column(&self, quantity: Quantity) -> (&str, bool) {
-        let given = self.given.iter().find(|given| given.quantity == quantity);
-        given.map_or((quantity.default_column().0, false), |given| (&given.column, given.reading.is_some()))
+        self.given(quantity)
+            .map_or((quantity.default_column().0, false), |given| (&given.column, given.reading.is_some()))
     }
 
     /// The rate of rows, Hz, if it was said.
@@ -219,83 +223,79 @@ impl ColumnMap {
         self.given.iter().map(|given| given.column.as_str()).chain(defaults).collect()
     }
 
-    /// The columns in use of a file with these `names`. Of output and error one is used: the one that was mapped, else
-    /// the output. `layout` if the file is not laid out as usual.
-    pub(super) fn resolve(
-        &self,
-        names: &[String],
-        line: u64,
-        layout: Option<&Layout>,
-    ) -> Result<Vec<MappedColumn>, TableProblem> {
-        let problem = |what: String| TableProblem { line, what };
+    /// The columns in use of a file. Of output and error one is used: the one that was mapped, else the output.
+    pub(super) fn resolve(&self, layout: &Layout) -> Result<Vec<MappedColumn>, TableProblem> {
+        let names = &layout.names;
+        let problem = |what: String| TableProblem { line: layout.header_line, what };
+        // The columns that may be meant by these names, and those that are there.
+        let there = |wanted: &[&str]| {
+            let meant = wanted.iter().filter_map(|name| likeliest(name, names.iter().map(String::as_str)));
+            let meant: String = meant.map(|name| question(name) + " ").collect();
+            [separator(names), &meant, &found(layout)].concat()
+        };
         let mut columns = Vec::new();
         for quantity in Quantity::ALL {
-            let given = self.given.iter().find(|given| given.quantity == quantity);
-            let default = quantity.default_column();
+            let (given, default) = (self.given(quantity), quantity.default_column());
             let name = given.map_or(default.0, |given| given.column.as_str());
             let mut places = names.iter().enumerate().filter(|(_, n)| *n == name).map(|(place, _)| place);
-            let place = match (places.next(), places.next()) {
-                (Some(_), Some(_)) => return Err(problem(format!("column {name} is there twice"))),
-                (Some(place), None) => Some(place),
-                (None, _) => given.and_then(|_| by_number(name, names.len())),
-            };
+            let place = places.next().or_else(|| given.and_then(|_| by_number(name, names.len())));
+            if places.next().is_some() {
+                return Err(problem(format!("column {name} is there twice")));
+            }
             let Some(place) = place else {
                 if given.is_none() {
                     continue;
                 }
-                let hint = [separator(names), &meant(name, names)].concat();
-                let mut what = format!("column {name} is missing, which --columns gives for {quantity}; {hint}");
-                what.push_str(&found(names, layout));
+                let what =
+                    format!("column {name} is missing, which --columns gives for {quantity}; {}", there(&[name]));
                 return Err(problem(what));
             };
             let said = given.and_then(|given| given.reading);
-            let reading = match said {
-                Some(reading) => reading,
-                None => unit_below(quantity, place, layout)
-                    .map_err(|wrong| problem(format!("column {name}: {}", quantity.refusal(wrong))))?
-                    .unwrap_or(Reading::of(default.1)),
-            };
+            let below = || unit_below(quantity, place, layout);
+            let reading = said.map_or_else(below, |reading| Ok(Some(reading)));
+            let reading = reading.map_err(|wrong| problem(format!("column {name}: {}", quantity.refusal(wrong))))?;
+            let reading = reading.unwrap_or(Reading::of(default.1));
             let (name, said) = (name.to_owned(), said.is_some());
             columns.push(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said });
         }
-        let has = |columns: &[MappedColumn], quantity| columns.iter().any(|c| c.quantity == quantity);
-        let mapped = |quantity| self.given.iter().any(|given| given.quantity == quantity);
-        if has(&columns, Quantity::Output) && has(&columns, Quantity::Error) {
-            let spare =
-                if mapped(Quantity::Error) && !mapped(Quantity::Output) { Quantity::Output } else { Quantity::Error };
-            columns.retain(|c| c.quantity != spare);
+        let has = |quantity| columns.iter().any(|column| column.quantity == quantity);
+        if !has(Quantity::Generator) {
+            return Err(problem(format!("column generator_rad is missing; {}", there(&["generator_rad"]))));
         }
-        let hint = separator(names);
-        if !has(&columns, Quantity::Generator) {
-            let meant = meant("generator_rad", names);
-            return Err(problem(format!("column generator_rad is missing; {hint}{meant}{}", found(names, layout))));
+        let (output, error) = (has(Quantity::Output), has(Quantity::Error));
+        if !output && !error {
+            let there = there(&["output_rad", "error_arcsec"]);
+            let what = format!("neither column output_rad nor error_arcsec is there; one is needed; {there}");
+            return Err(problem(what));
         }
-        if !has(&columns, Quantity::Output) && !has(&columns, Quantity::Error) {
-            let what = "neither column output_rad nor error_arcsec is there; one is needed";
-            let meant = [meant("output_rad", names), meant("error_arcsec", names)].concat();
-            return Err(problem(format!("{what}; {hint}{meant}{}", found(names, layout))));
+        if output && error {
+            let spare = match (self.given(Quantity::Output), self.given(Quantity::Error)) {
+                (None, Some(_)) => Quantity::Output,
+                _ => Quantity::Error,
+            };
+            columns.retain(|column| column.quantity != spare);
         }
         Ok(columns)
     }
 
     /// Notes on columns that are not among the `used` ones, though they are nearly called as one that is missing.
     pub(super) fn misspelt(&self, names: &[String], used: &[MappedColumn]) -> Vec<String> {
-        let spare: Vec<&str> =
-            names.iter().map(String::as_str).filter(|name| used.iter().all(|column| column.name != *name)).collect();
-        let missing = Quantity::ALL.into_iter().filter(|q| used.iter().all(|column| column.quantity != *q));
+        let is_used = |name: &str| used.iter().any(|column| column.name == name);
+        let spare = || names.iter().map(String::as_str).filter(|name| !is_used(name));
         // Of output and error one is used.
-        let missing = missing.filter(|q| !matches!(q, Quantity::Output | Quantity::Error));
-        missing
-            .filter_map(|quantity| {
-                let (default, _) = quantity.default_column();
-                let name = likeliest(default, spare.iter().copied())?;
-                let unit =
-                    Unit::in_name(name).filter(|unit| unit.family() == quantity.family()).map_or("UNIT", Unit::name);
-                Some(format!(
-                    "column {name} is not used; if it is {default}, say so with --columns {quantity}={name}:{unit}"
-                ))
-            })
-            .collect()
+        let missing = Quantity::ALL.into_iter().filter(|quantity| {
+            !matches!(quantity, Quantity::Output | Quantity::Error)
+                && used.iter().all(|column| column.quantity != *quantity)
+        });
+        let note = |quantity: Quantity| {
+            let (default, _) = quantity.default_column();
+            let name = likeliest(default, spare())?;
+            let unit = Unit::in_name(name).filter(|unit| unit.family() == quantity.family()).map_or("UNIT", Unit::name);
+            Some(format!(
+                "column {name} is not used; if it is {default}, say so with --columns {quantity}={name}:{unit}"
+            ))
+        };
+        missing.filter_map(note).collect()
     }
 }
 
@@ -333,37 +333,31 @@ fn by_number(name: &str, columns: usize) -> Option<usize> {
 }
 
 /// The reading by the line of units below the names; none where it has no word for the column, or a bare number.
-fn unit_below(quantity: Quantity, place: usize, layout: Option<&Layout>) -> Result<Option<Reading>, WrongReading> {
-    let word = layout.and_then(|layout| layout.units.get(place)).map_or("", |unit| unit_word(unit));
+fn unit_below(quantity: Quantity, place: usize, layout: &Layout) -> Result<Option<Reading>, WrongReading> {
+    let word = layout.units.get(place).map_or("", |unit| unit_word(unit));
     let written = !["", "-", "1"].contains(&word);
     written.then(|| Reading::parse(word, quantity.family(), None)).transpose()
 }
 
-/// The column that may be meant by `wanted`, if there is one.
-fn meant(wanted: &str, names: &[String]) -> String {
-    likeliest(wanted, names.iter().map(String::as_str)).map_or_else(String::new, |name| question(name) + " ")
-}
-
 /// The contents of the header, and how to name it.
-fn found(names: &[String], layout: Option<&Layout>) -> String {
+fn found(layout: &Layout) -> String {
+    let names = &layout.names;
     if names.iter().all(|name| name.is_empty()) {
         return "the file has no header".to_owned();
     }
-    let numbers = names.iter().all(|name| name.is_empty() || name.parse::<f64>().is_ok());
-    if numbers || layout.is_some_and(|layout| !layout.has_names) {
+    if !layout.has_names {
         return format!(
             "the first line has numbers, no names; the {} columns are mapped by number, --columns \
              generator=#1:UNIT,output=#2:UNIT",
             names.len()
         );
     }
-    let mut shown: Vec<String> = names.iter().take(12).map(|name| name.chars().take(40).collect()).collect();
-    if names.len() > 12 {
-        shown.push("…".to_owned());
-    }
+    let more = if names.len() > 12 { ", …" } else { "" };
+    let shown = names.iter().take(12).map(|name| name.chars().take(40).collect());
+    let shown = shown.collect::<Vec<String>>().join(", ");
     format!(
-        "found: {}; other names are mapped with --columns generator=NAME:UNIT,… (`flexspline look FILE` proposes it)",
-        shown.join(", ")
+        "found: {shown}{more}; other names are mapped with --columns generator=NAME:UNIT,… (`flexspline look FILE` \
+         proposes it)"
     )
 }
 
@@ -383,38 +377,43 @@ mod tests {
         text.split(',').map(str::to_owned).collect()
     }
 
+    fn laid_out(header: &str) -> Layout {
+        let mut layout = Layout::default();
+        (layout.names, layout.has_names, layout.header_line) = (names(header), true, 1);
+        layout
+    }
+
     #[test]
     fn a_mapping_names_columns_and_units() {
         let map = ColumnMap::parse("generator=wave_gen_turns:turn, error=error_arcsec,time=t_s").unwrap();
-        let columns = map.resolve(&names("t_s,wave_gen_turns,error_arcsec,output_rad"), 1, None).unwrap();
+        let columns = map.resolve(&laid_out("t_s,wave_gen_turns,error_arcsec,output_rad")).unwrap();
         let said: Vec<_> = columns.iter().map(|c| (c.quantity.name(), c.place, c.unit.name())).collect();
         assert_eq!(said, [("time", 0, "s"), ("generator", 1, "turn"), ("error", 2, "arcsec")]);
         // A name may hold a colon if the unit is said, and a unit in the name is believed.
         let map = ColumnMap::parse("generator=enc:1:deg,output=load_deg").unwrap();
-        let columns = map.resolve(&names("enc:1,load_deg"), 1, None).unwrap();
+        let columns = map.resolve(&laid_out("enc:1,load_deg")).unwrap();
         assert_eq!((columns[0].unit, columns[1].unit), (Unit::Degree, Unit::Degree));
         // A place in a list is no unit.
         let map = ColumnMap::parse("generator=position[1],output=out [gon]").unwrap();
-        let columns = map.resolve(&names("position[1],out [gon]"), 1, None).unwrap();
+        let columns = map.resolve(&laid_out("position[1],out [gon]")).unwrap();
         assert_eq!((columns[0].unit, columns[1].unit), (Unit::Radian, Unit::Gon));
     }
 
     #[test]
     fn the_output_is_used_where_both_are_there() {
-        let both = names("generator_rad,error_arcsec,output_rad");
-        let columns = ColumnMap::default().resolve(&both, 1, None).unwrap();
+        let columns = ColumnMap::default().resolve(&laid_out("generator_rad,error_arcsec,output_rad")).unwrap();
         assert_eq!(columns[1].quantity, Quantity::Output);
     }
 
     #[test]
     fn columns_go_by_number_where_no_name_is_meant() {
         let map = ColumnMap::parse("generator=#2:count/4096,output=3:-deg,torque=1").unwrap();
-        let columns = map.resolve(&names("1,b,c"), 1, None).unwrap();
+        let columns = map.resolve(&laid_out("1,b,c")).unwrap();
         let said: Vec<_> = columns.iter().map(|c| (c.quantity.name(), c.place, c.unit.name())).collect();
         assert_eq!(said, [("generator", 1, "turn"), ("output", 2, "deg"), ("torque", 0, "N.m")]);
         assert_eq!(columns[0].reading.value(1024.0), std::f64::consts::TAU / 4.0);
         assert_eq!(columns[1].reading.value(180.0), -std::f64::consts::PI);
-        let missing = ColumnMap::parse("generator=#4:deg").unwrap().resolve(&names("a,b,c"), 1, None).unwrap_err();
+        let missing = ColumnMap::parse("generator=#4:deg").unwrap().resolve(&laid_out("a,b,c")).unwrap_err();
         assert!(missing.what.contains("column #4 is missing"), "{missing:?}");
     }
 
@@ -452,7 +451,7 @@ mod tests {
 
     #[test]
     fn a_missing_column_whose_misspelling_is_there_is_named() {
-        let refused = |header: &str| ColumnMap::default().resolve(&names(header), 1, None).unwrap_err().what;
+        let refused = |header: &str| ColumnMap::default().resolve(&laid_out(header)).unwrap_err().what;
         for (header, said) in [
             ("generator_deg,output_rad", "generator_rad is missing; did you mean `generator_deg`? found: "),
             ("Generator_Rad,output_rad", "did you mean `Generator_Rad`?"),
@@ -464,13 +463,13 @@ mod tests {
             assert!(refused(header).contains(said), "{header}: {}", refused(header));
         }
         let map = ColumnMap::parse("torque=load_nm:N.m").unwrap();
-        let what = map.resolve(&names("generator_rad,output_rad,load_n_m"), 1, None).unwrap_err().what;
+        let what = map.resolve(&laid_out("generator_rad,output_rad,load_n_m")).unwrap_err().what;
         assert!(what.contains("did you mean `load_n_m`?"), "{what}");
         // One that may be missing is not asked for, but reported.
         let noted = |header: &str| {
             let names = names(header);
             let map = ColumnMap::default();
-            map.misspelt(&names, &map.resolve(&names, 1, None).unwrap())
+            map.misspelt(&names, &map.resolve(&laid_out(header)).unwrap())
         };
         assert_eq!(
             noted("generator_rad,output_rad,torque_Nm,time_ms"),

@@ -157,23 +157,19 @@ pub(super) fn read(
     }
     let sheet = Sheet::of(bytes, &map.known()).map_err(refuse)?;
     let layout = &sheet.layout;
-    let columns = map.resolve(&layout.names, layout.header_line, Some(layout)).map_err(refuse)?;
+    let columns = map.resolve(layout).map_err(refuse)?;
     let places: Vec<usize> = columns.iter().map(|column| column.place).collect();
     let read = sheet.columns(&places).map_err(refuse)?;
     findings.notes.extend(map.misspelt(&layout.names, &columns));
     findings.notes.extend(sheet.notes.iter().chain(&read.notes).cloned());
-    match of_columns(layout, read, &columns, map.rate_hz(), fewest, findings).map_err(refuse)? {
+    match of_columns(layout, read, &columns, map.rate_hz(), fewest, findings) {
         (_, Some(problem)) => Err(refuse(problem)),
         (log, None) => Ok(LogFile { log, columns, own_zeros: false }),
     }
 }
 
-/// The log of `read`, which has the columns in use in their order; `rate_hz` if the file has no time.
-///
-/// A cell that is no number is missing in it; the first of them is given with the log, which is then not for use.
-///
-/// # Errors
-/// A column holds times, or numbers beyond all limits, or there are fewer rows than `fewest`.
+/// The log of `read`, which has the columns in use in their order; `rate_hz` if the file has no time; and the first
+/// reason to refuse it, if there is one: then what cannot be used is missing in it.
 pub(crate) fn of_columns(
     layout: &Layout,
     mut read: Columns,
@@ -181,7 +177,7 @@ pub(crate) fn of_columns(
     rate_hz: Option<f64>,
     fewest: usize,
     findings: &mut Findings,
-) -> Result<(Log, Option<TableProblem>), TableProblem> {
+) -> (Log, Option<TableProblem>) {
     let last = columns.iter().map(|column| column.place).max().unwrap_or(0);
     let broken_off = read.without_broken_end(last);
     let broken_off = broken_off.map(|line| Fault::new(FaultName::MissingSamples, [line; 2], 1));
@@ -190,57 +186,62 @@ pub(crate) fn of_columns(
     });
     let notes = &mut findings.notes;
     let mut refused = check_rows(layout, &read, columns).err();
+    let mut refuse = |why: Option<TableProblem>| refused = refused.take().or(why);
+    let of_header = |what: String| Some(TableProblem { line: layout.header_line, what });
     if let Some((place, what)) = &layout.whole_seconds
         && columns.iter().any(|column| column.quantity == Quantity::Time && column.place == *place)
     {
-        refused = refused.or(Some(TableProblem { line: layout.header_line, what: what.clone() }));
+        refuse(of_header(what.clone()));
     }
     let mut log = Log::default();
     for (column, cells) in columns.iter().zip(std::mem::take(&mut read.cells)) {
-        let times = cells.times.count > 0;
-        match check_cells(column, &cells) {
-            Err(problem) if times && column.quantity != Quantity::Time => return Err(refused.unwrap_or(problem)),
-            odd => refused = refused.or(odd.err()),
-        }
+        refuse(check_cells(column, &cells).err());
         notes.extend(cells.over_note(&column.name));
+        let times = cells.times.count > 0;
         let mut values = cells.values;
-        if !times {
-            within_limits(column, &values, &read.lines).map_err(|problem| refused.clone().unwrap_or(problem))?;
+        let beyond = if times { None } else { within_limits(column, &values, &read.lines).err() };
+        if beyond.is_some() || times && column.quantity != Quantity::Time {
+            values.fill(f64::NAN);
+        } else if !times {
             values.iter_mut().for_each(|value| *value = column.reading.value(*value));
         }
+        refuse(beyond);
         if cells.time_of_day {
             past_midnight(&mut values, notes);
         }
         log.put(column.quantity, values);
     }
     log.line = read.lines;
-    let refuse = |what: String| refused.clone().unwrap_or(TableProblem { line: layout.header_line, what });
     if log.len() < fewest {
         let rows = match log.len() {
             0 => "no rows".to_owned(),
             1 => "1 row".to_owned(),
             n => format!("{n} rows"),
         };
-        return Err(refuse(format!(
+        refuse(of_header(format!(
             "{rows} after the header; at least {fewest} are needed: a log has a line for each instant of a motion"
         )));
     }
-    if log.get(Quantity::Time).is_none() && log.len() >= ROWS_OF_A_PART * read.restarts.len() {
+    let timed = log.get(Quantity::Time).is_some();
+    if !timed && log.len() >= ROWS_OF_A_PART * read.restarts.len() {
         // Nothing else says where one recording ends and the next begins.
         let mut begins: Vec<usize> =
             read.restarts.iter().map(|names| log.line.partition_point(|line| line < names)).collect();
         begins.dedup();
         log.begin_sessions(&begins);
     }
-    if let Some(rate_hz) = rate_hz {
-        if log.get(Quantity::Time).is_some() {
-            return Err(refuse("the file has a column of time; allowed with it: no --rate".to_owned()));
+    match rate_hz {
+        Some(_) if timed => {
+            refuse(of_header("the file has a column of time; allowed with it: no --rate".to_owned()));
         }
-        log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
-        notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
+        Some(rate_hz) => {
+            log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
+            notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
+        }
+        None => {}
     }
     in_order(&mut log, findings);
-    Ok((log, refused))
+    (log, refused)
 }
 
 fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64, findings: &mut Findings) -> Result<LogFile, TableProblem> {

@@ -23,8 +23,6 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-use flexspline_base::csv_rows::TableProblem;
-
 pub(crate) use columns::MappedColumn;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
@@ -350,24 +348,18 @@ impl ReadRows {
         let cells = |column: &MappedColumn| file.columns.cells[column.place].clone();
         let read = file.columns.with_cells(columns.iter().map(cells).collect());
         let mut findings = Findings::default();
-        let (log, stamps_s, notes) = (Log::default(), Vec::new(), Vec::new());
-        let mut rows = ReadRows { log, stamps_s, notes, milliseconds: false };
-        let at = |problem: TableProblem| MeasuredError::at(&file.file, problem);
-        let made = log::of_columns(&file.sheet.layout, read, columns, None, 0, &mut findings);
-        let (mut log, refused) = match made {
-            Ok(made) => made,
-            Err(problem) => return (rows, Some(at(problem))),
-        };
-        rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
+        let (mut log, refused) = log::of_columns(&file.sheet.layout, read, columns, None, 0, &mut findings);
+        let stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
         let ordered = in_order(&mut log, columns, &mut findings);
         if log.len() > 1 {
             rollover::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings.notes);
         }
-        rows.log = log;
-        rows.notes = findings.notes;
-        rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
-        rows.milliseconds = matches!(ordered, Err(Refusal::Milliseconds { .. }));
-        (rows, refused.map(at).or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why))))
+        let Findings { faults, mut notes, .. } = findings;
+        notes.extend(faults.into_iter().map(|fault| fault.what));
+        let milliseconds = matches!(ordered, Err(Refusal::Milliseconds { .. }));
+        let refused = refused.map(|problem| MeasuredError::at(&file.file, problem));
+        let refused = refused.or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why)));
+        (ReadRows { log, stamps_s, notes, milliseconds }, refused)
     }
 
     /// Sessions, one at least.
