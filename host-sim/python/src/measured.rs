@@ -108,11 +108,9 @@ pub fn calibrate<'py>(
         Ok((made.calibration, made.table, made.shown))
     })?;
     let (calibration, table, shown) = made;
-    let column = |of: usize| shown.iter().map(|row| row[of]).collect::<Vec<f64>>().into_pyarray(py);
+    let column = |of: usize| shown.iter().map(|row| row[of]).collect();
     let rows = PyDict::new(py);
-    rows.set_item("output_rad", column(0))?;
-    rows.set_item("measured_arcsec", column(1))?;
-    rows.set_item("left_arcsec", column(2))?;
+    add(&rows, [("output_rad", column(0)), ("measured_arcsec", column(1)), ("left_arcsec", column(2))])?;
     Ok((serde_json::to_string(&calibration).map_err(bad)?, parts(py, &table)?, rows))
 }
 
@@ -190,13 +188,18 @@ pub fn diagnose<'py>(
             ))
         });
         let series = done.extended.predict(&done.recording.sessions, &subject.nominal, subject.table.as_ref());
-        let rows = Rows::of(&done.recording.sessions, &series);
+        let of_session = |(k, session): (usize, &Session)| vec![k as i64 + 1; session.len()];
+        let session: Vec<i64> = done.recording.sessions.iter().enumerate().flat_map(of_session).collect();
+        let rows = (session, rows_of(&done.recording.sessions, &series));
         let best = made.tables.into_iter().next().map(|(_, table)| table);
         Ok((json, made.drive_toml, best, explanation.transpose()?, rows))
     })?;
-    let (json, drive_toml, table, explanation, rows) = done;
+    let (json, drive_toml, table, explanation, (session, numbers)) = done;
     let table = table.map(|table| parts(py, &table)).transpose()?;
-    Ok((json, drive_toml, table, explanation, rows.columns(py)?))
+    let rows = PyDict::new(py);
+    rows.set_item("session", session.into_pyarray(py))?;
+    add(&rows, numbers)?;
+    Ok((json, drive_toml, table, explanation, rows))
 }
 
 /// A subject with the influence kernels of a file.
@@ -208,40 +211,27 @@ fn with_kernels<'a>(subject: Subject<'a>, path: &Path) -> Result<Subject<'a>, Py
 }
 
 /// The rows that a diagnosis looked at, with what the models say of them.
-struct Rows {
-    session: Vec<i64>,
-    numbers: Vec<(&'static str, Vec<f64>)>,
+fn rows_of(sessions: &[Session], series: &[Series]) -> Vec<(&'static str, Vec<f64>)> {
+    let of = |values: fn(&Session, &Series) -> Vec<f64>| {
+        sessions.iter().zip(series).flat_map(|(a, b)| values(a, b)).collect::<Vec<f64>>()
+    };
+    let recorded = |values: &Option<Vec<f64>>, rows: usize| values.clone().unwrap_or_else(|| vec![f64::NAN; rows]);
+    let or_absent = |values: fn(&Session) -> &Option<Vec<f64>>| {
+        sessions.iter().flat_map(|session| recorded(values(session), session.len())).collect::<Vec<f64>>()
+    };
+    vec![
+        ("time_s", or_absent(|session| &session.time_s)),
+        ("generator_rad", of(|session, _| session.generator_rad.clone())),
+        ("error_arcsec", of(|session, _| session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD).collect())),
+        ("torque_n_m", or_absent(|session| &session.torque_n_m)),
+        ("temperature_c", or_absent(|session| &session.temperature_c)),
+        ("nominal_arcsec", of(|_, series| series.nominal_arcsec.clone())),
+        ("recalibrated_arcsec", of(|_, series| series.recalibrated_arcsec.clone())),
+        ("extended_arcsec", of(|_, series| series.extended_arcsec.clone())),
+    ]
 }
 
-impl Rows {
-    fn of(sessions: &[Session], series: &[Series]) -> Rows {
-        let pairs = || sessions.iter().zip(series);
-        let session = sessions.iter().enumerate().flat_map(|(k, session)| vec![k as i64 + 1; session.len()]).collect();
-        let of =
-            |values: fn(&Session, &Series) -> Vec<f64>| pairs().flat_map(|(a, b)| values(a, b)).collect::<Vec<f64>>();
-        let or_absent = |values: &Option<Vec<f64>>, rows: usize| values.clone().unwrap_or_else(|| vec![f64::NAN; rows]);
-        let beside = |values: fn(&Session) -> &Option<Vec<f64>>| {
-            sessions.iter().flat_map(|session| or_absent(values(session), session.len())).collect::<Vec<f64>>()
-        };
-        let numbers = vec![
-            ("time_s", beside(|session| &session.time_s)),
-            ("generator_rad", of(|session, _| session.generator_rad.clone())),
-            ("error_arcsec", of(|session, _| session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD).collect())),
-            ("torque_n_m", beside(|session| &session.torque_n_m)),
-            ("temperature_c", beside(|session| &session.temperature_c)),
-            ("nominal_arcsec", of(|_, series| series.nominal_arcsec.clone())),
-            ("recalibrated_arcsec", of(|_, series| series.recalibrated_arcsec.clone())),
-            ("extended_arcsec", of(|_, series| series.extended_arcsec.clone())),
-        ];
-        Rows { session, numbers }
-    }
-
-    fn columns<'py>(self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let columns = PyDict::new(py);
-        columns.set_item("session", self.session.into_pyarray(py))?;
-        for (name, values) in self.numbers {
-            columns.set_item(name, values.into_pyarray(py))?;
-        }
-        Ok(columns)
-    }
+/// Adds columns of numbers, as arrays by their names.
+fn add(to: &Bound<'_, PyDict>, columns: impl IntoIterator<Item = (&'static str, Vec<f64>)>) -> PyResult<()> {
+    columns.into_iter().try_for_each(|(name, values)| to.set_item(name, values.into_pyarray(to.py())))
 }
