@@ -28,7 +28,7 @@ use pair::pair;
 pub use picture::text;
 use relation::torque_says;
 use turns::{proposed_ratio, units_of_counts};
-use words::Said;
+use words::NameMeaning;
 
 /// The contents of a column, as far as they can be decided.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -81,7 +81,7 @@ impl Role {
 
 /// A column.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Column {
+pub struct LookedColumn {
     /// Its name, `#1` and so on where the file has none.
     pub name: String,
     /// Its contents.
@@ -134,7 +134,7 @@ pub struct Looked {
     /// Line of the names of the first file; `None` if it names none.
     pub header_line: Option<u64>,
     /// The columns.
-    pub columns: Vec<Column>,
+    pub columns: Vec<LookedColumn>,
     /// Other columns that may be generator and output as well, the likeliest first.
     pub rivals: Vec<Rival>,
     /// Turns of the generator for one of the output as the rows have it, signed.
@@ -174,11 +174,11 @@ pub struct Rival {
 #[derive(Clone, Default)]
 struct Guess {
     /// As it is reported; its unit is written last.
-    column: Column,
+    column: LookedColumn,
     /// Its name in a mapping.
     name: String,
     facts: Facts,
-    said: Said,
+    said: NameMeaning,
     unit: Option<Unit>,
     /// A unit that is written and not known.
     unknown_unit: Option<String>,
@@ -301,6 +301,11 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
     let proposed = ratio.map(proposed_ratio);
     let error = error_rad(&guesses, proposed);
     torque(&mut guesses, error.as_deref(), &mut notes);
+    if let Some(half) = proposed.filter(|ratio| ratio.fract() != 0.0) {
+        notes.push(format!(
+            "ratios are whole numbers but for wheels with an odd number of teeth: {half} is nearest to these rows"
+        ));
+    }
     ask_for_units(&mut guesses, &mut notes);
     let mut columns_option = option(&guesses, &mut notes);
     // From here on the rows are those that `calibrate` and `diagnose` have by this mapping.
@@ -339,7 +344,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
         period_s,
         coverage: coverage::of(&read),
         columns_option,
-        columns: guesses.into_iter().map(|guess| Column { unit: guess.written(), ..guess.column }).collect(),
+        columns: guesses.into_iter().map(|guess| LookedColumn { unit: guess.written(), ..guess.column }).collect(),
         notes,
     })
 }
@@ -351,11 +356,11 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     let mut cells = files[0].columns.cells[place].clone();
     files[1..].iter().for_each(|file| cells.values.extend_from_slice(&file.columns.cells[place].values));
     let facts = Facts::of(&cells);
-    let said = if layout.has_names { words::said(name, unit.map(String::as_str)) } else { Said::default() };
+    let said = if layout.has_names { words::said(name, unit.map(String::as_str)) } else { NameMeaning::default() };
     let mut values = std::mem::take(&mut cells.values);
     facts.anew.into_iter().for_each(|anew| continued(&mut values, anew.span));
     let (least, most, step, missing) = (facts.least, facts.most, facts.step, values.len() - facts.finite);
-    let column = Column { name: name.clone(), least, most, step, missing, ..Column::default() };
+    let column = LookedColumn { name: name.clone(), least, most, step, missing, ..LookedColumn::default() };
     let name_in_mapping = name_in_mapping(&layout.names, place);
     let mut guess =
         Guess { column, name: name_in_mapping, facts, said, values, of_file: of_file.clone(), ..Guess::default() };

@@ -80,7 +80,7 @@ pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f6
         }
         let sure = match rivals.first() {
             Some(_) => 0.5,
-            None if guess.column.role == role => 0.9,
+            None if guess.column.role == role && unit.written().is_some() => 0.9,
             None => 0.6,
         };
         (guess.column.role, guess.column.used) = (role, true);

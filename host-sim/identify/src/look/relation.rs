@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sign_of_a_torque_is_told() {
+    fn the_sign_of_a_torque_is_found() {
         let out: Vec<f64> = (0..2000).map(|k| 2e-3 * f64::from(k)).collect();
         let torque: Vec<f64> = (0..2000).map(|k| 20.0 * (0.013 * f64::from(k)).sin()).collect();
         let error: Vec<f64> = out.iter().zip(&torque).map(|(o, t)| 1e-3 * o.sin() - t / 3e4).collect();

@@ -181,7 +181,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
             By("time=time:s,generator=motor_inc:count/2^24,output=load_inc:count/16777216,torque=torque:Nm"),
         ),
         (
-            "counts beside an angle",
+            "counts next to an angle",
             log("time,motor_inc,load_inc,torque,joint_angle\n", ",", |t, k| {
                 let mut fields = encoder_counts(t, k);
                 fields.push(format!("{:.8}", t.output_rad[k]));
@@ -489,8 +489,8 @@ fn what_is_left_of_a_damaged_file_is_right() {
         let recording = read(text.as_bytes(), MAP).unwrap_or_else(|error| panic!("{name}: {error}"));
         let rows: usize = recording.sessions.iter().map(crate::measurement::Session::len).sum();
         assert!(rows >= fewest && rows <= ROWS, "{name}: {rows} rows");
-        let told = recording.faults.iter().any(|found| found.name.as_str() == fault);
-        assert!(told || fault.is_empty(), "{name}: {:?}", recording.faults);
+        let reported = recording.faults.iter().any(|found| found.name.as_str() == fault);
+        assert!(reported || fault.is_empty(), "{name}: {:?}", recording.faults);
         for session in &recording.sessions {
             let output = session.output_rad(RATIO);
             for k in 0..session.len() {
@@ -715,7 +715,16 @@ fn counts_that_the_file_does_not_say_are_asked() {
         "{:?}",
         looked.columns[1]
     );
+    assert!(looked.columns[1].confidence < 0.7, "{:?}", looked.columns[1]);
     let due = "--columns generator=motor:count/COUNTS,output=load:rad";
+    assert!(looked.notes.iter().any(|note| note.ends_with(due)), "{}", text(&looked));
+    // The counts of a register are not those of the other encoder where the ratio is none.
+    let registers = file("time,motor,load,torque\n", ",", |t, k| {
+        let motor = (t.generator_rad[k] / TAU * 16_384.0).round().rem_euclid(16_384.0);
+        with(with(plain(t, k), 1, format!("{motor:.0}")), 2, counts(t.output_rad[k] + 2.5, 1_048_576.0))
+    });
+    let looked = looked_at(registers.as_bytes()).unwrap();
+    let due = "--columns generator=motor:count/16384,output=load:count/COUNTS";
     assert!(looked.notes.iter().any(|note| note.ends_with(due)), "{}", text(&looked));
     // So are units that are written and not known, and no size is assumed.
     let looked = looked_at(file("time_s,motor [foo],load [foo],torque [Nmx]\n", ",", plain).as_bytes()).unwrap();

@@ -99,25 +99,31 @@ pub(super) struct Units {
 /// The units of two columns as generator and output; `raw` is the change of the generator's number for one of the
 /// output's. None if the ratio is not one of a strain wave gear.
 pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Option<Units> {
-    let [generator, output] = [unit_of(generator, output), unit_of(output, generator)];
-    let ratio = match [generator, output].map(|of| rad(of.unit?, of.counts)) {
-        [Some(g), Some(o)] => Some(raw * g / o),
-        // Both are counts, of encoders that are taken to be alike.
-        [None, None] => Some(raw),
-        _ => None,
-    };
-    let fits = ratio.is_none_or(|ratio| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs()));
-    fits.then_some(Units { generator, output, ratio })
+    // Counts of the other encoder are taken if they make such a ratio, else they are asked.
+    let found = [true, false].map(|alike| {
+        let [generator, output] = [unit_of(generator, output, alike), unit_of(output, generator, alike)];
+        let ratio = match [generator, output].map(|of| rad(of.unit?, of.counts)) {
+            [Some(g), Some(o)] => Some(raw * g / o),
+            // Both are counts, of encoders that are taken to be alike.
+            [None, None] => Some(raw),
+            _ => None,
+        };
+        Units { generator, output, ratio }
+    });
+    let fits = |units: &Units| units.ratio.is_none_or(|ratio| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs()));
+    found.into_iter().find(fits)
 }
 
-/// The unit of a column together with another one: radians, or the same counts, where the file does not say it.
-fn unit_of(guess: &Guess, other: &Guess) -> AngleUnit {
+/// The unit of a column together with another one: radians, or the same counts if they are `alike`, where the file does
+/// not say it.
+fn unit_of(guess: &Guess, other: &Guess, alike: bool) -> AngleUnit {
     let known = |guess: &Guess| guess.column.counts_per_turn.map(|counts| (counts, ""));
     let anew = |guess: &Guess| {
         let span = guess.facts.anew.map(|anew| anew.span).filter(|_| guess.unit == Some(Unit::Count))?;
         registers().any(|register| register == span).then_some((span, "after which it begins anew"))
     };
-    let same = || known(other).or_else(|| anew(other)).map(|(counts, _)| (counts, "as the other encoder has"));
+    let of_other = || known(other).or_else(|| anew(other)).filter(|_| alike);
+    let same = || of_other().map(|(counts, _)| (counts, "as the other encoder has"));
     match guess.unit {
         Some(Unit::Count) => {
             let counts = known(guess).or_else(|| anew(guess)).or_else(same);

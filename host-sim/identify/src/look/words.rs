@@ -38,7 +38,7 @@ const ASIDE: [&str; 11] =
 
 /// The meaning of a column's name and unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Said {
+pub(super) struct NameMeaning {
     /// Its contents.
     pub role: Option<Role>,
     /// Whether it is that of a command.
@@ -53,7 +53,7 @@ pub(super) struct Said {
 
 /// The meaning of a name, and of the unit that stands in a line of its own if there is one. Units count before words: a
 /// load in N·m is a torque, whatever it is called.
-pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
+pub(super) fn said(name: &str, unit: Option<&str>) -> NameMeaning {
     let words = words(name);
     let is = |known: &str| words.iter().any(|word| word == known);
     // A long word also counts inside of another: motorposition, Abtriebswinkel.
@@ -61,7 +61,7 @@ pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
     let any = |known: &[&str]| known.iter().any(|known| holds(known));
     let joint = joint(name);
     if any(&ASIDE) || is("following") {
-        return Said { aside: true, joint, ..Said::default() };
+        return NameMeaning { aside: true, joint, ..NameMeaning::default() };
     }
     let by_unit = role_by_unit(name, unit);
     let angle = by_unit.map_or_else(|| any(&ANGLES), |role| role == Role::Unknown);
@@ -79,7 +79,7 @@ pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
         certain => certain,
     };
     let angle = angle && role.is_none_or(|role| role.is_angle());
-    Said { role, commanded: any(&COMMANDED), angle, aside: false, joint }
+    NameMeaning { role, commanded: any(&COMMANDED), angle, aside: false, joint }
 }
 
 /// The role by the unit in a line of its own, in brackets, or at the end of a name; [`Role::Unknown`] for an angle, of
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn names_tell_angles_and_commands_and_joints() {
+    fn names_show_angles_and_commands_and_joints() {
         for name in ["field.position0", "Axis1.ActPos", "q3", "theta_2", "Kanal [deg]", "current_position", "motor_enc"]
         {
             assert!(said(name, None).angle && !said(name, None).commanded, "{name}");
