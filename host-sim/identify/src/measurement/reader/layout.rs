@@ -189,7 +189,11 @@ impl Layout {
         let row = |line: &HeadLine| {
             is_row(&line.fields, self.decimal_comma) && !begins_with_a_word(&line.fields, &self.kinds)
         };
-        let rows_from = lines.iter().position(|line| line.fields.len() >= width && row(line)).unwrap_or(0);
+        let full = lines.iter().position(|line| line.fields.len() >= width && row(line)).unwrap_or(0);
+        // Rows of fewer fields above the first of the usual width are rows as well.
+        let is_text = |field: &String| CellKind::of(field, self.decimal_comma) == CellKind::Text;
+        let shorter = |line: &&HeadLine| line.fields.len() > 1 && row(line) && !line.fields.iter().any(is_text);
+        let rows_from = full - lines[..full].iter().rev().take_while(shorter).count();
         let begins = lines[rows_from].number;
         let (above, rows) = lines.split_at(rows_from);
         let names = self.find_names(above, known, notes);

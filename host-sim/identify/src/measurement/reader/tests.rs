@@ -420,6 +420,11 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
             csv().replacen("\n3", "\n\"3", 1).into(),
             Refused("a quote that nothing closes"),
         ),
+        (
+            "a last column that begins later",
+            log(NAMES, ",", |k| plain(k)[..if k < 50 { 3 } else { 4 }].to_vec()),
+            Blocked("3 fields, but torque_Nm is field 4"),
+        ),
         // Zero bytes.
         ("a hole of zeros", holes(9000, 512), Read(ROWS - 1, "zero bytes stand in 1 line")),
         ("zeros at the end", [csv().as_bytes(), &[0; 5000]].concat(), Read(ROWS, "zero bytes stand in 1 line")),
