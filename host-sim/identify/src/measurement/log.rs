@@ -1,7 +1,7 @@
 //! A file as it stands: its columns in rad, s, N·m and °C, what is missing as NaN.
 
 use std::fmt;
-use std::io::{Cursor, Read};
+use std::io::Read;
 use std::ops::Range;
 
 use thiserror::Error;
@@ -138,22 +138,28 @@ pub(super) struct LogFile {
     pub own_zeros: bool,
 }
 
+/// The bytes of `source`, a file called `file`.
+pub(super) fn all_of(file: &str, mut source: impl Read) -> Result<Vec<u8>, MeasuredError> {
+    let mut bytes = Vec::new();
+    let read = source.read_to_end(&mut bytes);
+    read.map_err(|error| MeasuredError::at(file, TableProblem { line: 1, what: error.to_string() }))?;
+    Ok(bytes)
+}
+
 /// Reads a file called `file`, of at least `fewest` rows; `ratio` is that of the axis of a guide log, which says no
 /// generator angle.
 pub(super) fn read(
     file: &str,
-    mut source: impl Read,
+    source: impl Read,
     map: &ColumnMap,
     ratio: f64,
     fewest: usize,
     findings: &mut Findings,
 ) -> Result<LogFile, MeasuredError> {
     let refuse = |problem: TableProblem| MeasuredError::at(file, problem);
-    let mut bytes = Vec::new();
-    let begun = source.read_to_end(&mut bytes);
-    begun.map_err(|error| refuse(TableProblem { line: 1, what: error.to_string() }))?;
+    let bytes = all_of(file, source)?;
     if phd2::is_one(&bytes) {
-        return guide_log(bytes, map, ratio, findings).map_err(refuse);
+        return guide_log(&bytes, map, ratio, findings).map_err(refuse);
     }
     let sheet = Sheet::of(bytes, &map.known()).map_err(refuse)?;
     let layout = &sheet.layout;
@@ -230,27 +236,23 @@ pub(crate) fn of_columns(
         begins.dedup();
         log.begin_sessions(&begins);
     }
-    match rate_hz {
-        Some(_) if timed => {
-            refuse(of_header("the file has a column of time; allowed with it: no --rate".to_owned()));
-        }
-        Some(rate_hz) => {
-            log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
-            notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
-        }
-        None => {}
+    if let Some(rate_hz) = rate_hz.filter(|_| !timed) {
+        log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
+        notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
+    } else if rate_hz.is_some() {
+        refuse(of_header("the file has a column of time; allowed with it: no --rate".to_owned()));
     }
     in_order(&mut log, findings);
     (log, refused)
 }
 
-fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64, findings: &mut Findings) -> Result<LogFile, TableProblem> {
+fn guide_log(bytes: &[u8], map: &ColumnMap, ratio: f64, findings: &mut Findings) -> Result<LogFile, TableProblem> {
     if *map != ColumnMap::default() {
         let what = "a guide log of PHD2 has columns and times of its own, found --columns or --rate; allowed: neither"
             .to_owned();
         return Err(TableProblem { line: 1, what });
     }
-    let (log, notes) = phd2::read(Cursor::new(bytes), ratio)?;
+    let (log, notes) = phd2::read(bytes, ratio)?;
     if log.len() < FEWEST_ROWS {
         let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());
         return Err(TableProblem { line: 1, what });

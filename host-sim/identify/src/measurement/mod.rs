@@ -224,7 +224,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// The same file with these sessions, none of its faults told again.
+    /// The same file with these sessions, none of its faults reported again.
     #[must_use]
     pub(crate) fn with_sessions(&self, sessions: Vec<Session>) -> Recording {
         Recording {

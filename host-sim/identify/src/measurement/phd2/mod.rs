@@ -18,7 +18,6 @@ mod axis;
 mod text;
 
 use std::f64::consts::TAU;
-use std::io::{BufRead, BufReader, Read};
 
 use super::columns::Quantity;
 use super::log::Log;
@@ -149,12 +148,11 @@ impl GuideSection {
 }
 
 /// Reads a guide log of an axis with this ratio; the rows and what is to be said of them.
-pub(super) fn read(source: impl Read, ratio: f64) -> Result<(Log, Vec<String>), TableProblem> {
+pub(super) fn read(bytes: &[u8], ratio: f64) -> Result<(Log, Vec<String>), TableProblem> {
     let mut sections: Vec<GuideSection> = Vec::new();
     let (mut guiding, mut session) = (false, 0_u32);
-    for (line, number) in BufReader::new(source).split(b'\n').zip(1_u64..) {
-        let line = line.map_err(|error| TableProblem { line: number, what: error.to_string() })?;
-        let line = String::from_utf8_lossy(&line);
+    for (line, number) in bytes.split(|byte| *byte == b'\n').zip(1_u64..) {
+        let line = String::from_utf8_lossy(line);
         let line = line.trim();
         if let Some(at) = line.trim_start_matches('"').strip_prefix("Guiding Begins at ") {
             session += 1;

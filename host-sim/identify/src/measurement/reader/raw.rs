@@ -3,9 +3,9 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::super::log::{FEWEST_ROWS, MeasuredError};
+use super::super::log::{FEWEST_ROWS, MeasuredError, all_of};
 use super::super::{bytes_of, phd2};
-use super::{Columns, Sheet, shortened};
+use super::{Columns, FoundCell, Sheet, shortened};
 use flexspline_base::csv_rows::TableProblem;
 
 /// A file and all of its columns.
@@ -32,30 +32,28 @@ pub fn read(path: &Path) -> Result<RawFile, MeasuredError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError> {
-    let refuse = |line: u64, what: String| MeasuredError::at(file, TableProblem { line, what });
-    let mut bytes = Vec::new();
-    source.read_to_end(&mut bytes).map_err(|error| refuse(1, error.to_string()))?;
-    if phd2::is_one(&bytes[..bytes.len().min(super::layout::HEAD)]) {
+pub fn parse(file: &str, source: impl Read) -> Result<RawFile, MeasuredError> {
+    let at = |problem: TableProblem| MeasuredError::at(file, problem);
+    let refuse = |line: u64, what: String| Err(at(TableProblem { line, what }));
+    let bytes = all_of(file, source)?;
+    if phd2::is_one(&bytes) {
         let what = "a guide log of PHD2 has columns of its own, and needs no mapping: flexspline calibrate FILE \
                     --ratio N";
-        return Err(refuse(1, what.to_owned()));
+        return refuse(1, what.to_owned());
     }
-    let sheet = Sheet::of(bytes, &[]).map_err(|problem| MeasuredError::at(file, problem))?;
+    let sheet = Sheet::of(bytes, &[]).map_err(at)?;
     let all: Vec<usize> = (0..sheet.layout.names.len()).collect();
-    let columns = sheet.columns(&all).map_err(|problem| MeasuredError::at(file, problem))?;
-    let rows = columns.lines.len();
-    let numbers = columns.cells.iter().any(|cells| cells.values.iter().any(|value| value.is_finite()));
-    if rows >= FEWEST_ROWS && numbers {
-        return Ok(RawFile { file: file.to_owned(), sheet, columns });
+    let columns = sheet.columns(&all).map_err(at)?;
+    let (rows, line) = (columns.lines.len(), sheet.layout.header_line);
+    if !columns.cells.iter().any(|cells| cells.values.iter().any(|value| value.is_finite())) {
+        let first = columns.cells.iter().find_map(|cells| cells.words.first.as_ref());
+        let found = |cell: &FoundCell| format!("; found \"{}\" in line {}", shortened(&cell.text), cell.line);
+        let found = first.map_or_else(String::new, found);
+        return refuse(line, format!("no rows of numbers; allowed: a text file with a line for each instant{found}"));
     }
-    let what = if numbers {
-        format!("{rows} row{}; at least {FEWEST_ROWS} are needed", if rows == 1 { "" } else { "s" })
-    } else {
-        let first = columns.cells.iter().find_map(|cells| cells.words.first.clone());
-        let found = first
-            .map_or_else(String::new, |cell| format!("; found \"{}\" in line {}", shortened(&cell.text), cell.line));
-        format!("no rows of numbers; allowed: a text file with a line for each instant{found}")
-    };
-    Err(refuse(sheet.layout.header_line, what))
+    if rows < FEWEST_ROWS {
+        let what = format!("{rows} row{}; at least {FEWEST_ROWS} are needed", if rows == 1 { "" } else { "s" });
+        return refuse(line, what);
+    }
+    Ok(RawFile { file: file.to_owned(), sheet, columns })
 }
