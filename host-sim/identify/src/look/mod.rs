@@ -318,7 +318,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
             // The refusal holds both readings; the mapping holds the one that fits the rows.
             let time = guesses.iter_mut().filter(|guess| guess.serves_as(Role::Time));
             time.for_each(|time| time.unit = Some(Unit::Millisecond));
-            columns_option = option(&guesses, &mut notes);
+            columns_option = option(&guesses, &mut Vec::new());
         }
         // A cell in use that is no number, or a row of another width, is for people to mend.
         if let Some(refused) = refused {
