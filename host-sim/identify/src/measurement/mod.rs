@@ -26,6 +26,7 @@ use std::path::Path;
 pub(crate) use columns::MappedColumn;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
+use faults::clock::SESSION_GAP_PERIODS;
 pub(crate) use faults::{LineFit, throughout};
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,
@@ -40,6 +41,9 @@ pub(crate) use unit::{Family, WrongReading};
 use faults::Findings;
 use log::{Log, LogFile};
 use raw::RawFile;
+
+/// More sessions than a person makes. *Guess*.
+const MANY_SESSIONS: usize = 50;
 
 /// The remedy for a file of which each channel has rows of its own.
 pub(crate) const APART: &str = ": they are never recorded in one row; allowed: both in a row, in pandas: df[OUTPUT] = \
@@ -285,6 +289,7 @@ pub(crate) fn parse_at_least(
     let other_zeros = if drifts { Vec::new() } else { faults::leaps::between_sessions(&mut log, gear, &mut findings) };
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
+    findings.notes.extend(many_sessions(&sessions));
     for (session, off_rad) in other_zeros.iter().copied() {
         sessions[session].own_zero = true;
         sessions[session..].iter_mut().for_each(|later| later.zero_off_rad = off_rad);
@@ -385,6 +390,19 @@ fn enough(log: &Log, recorded: String, fewest: usize) -> Result<(), Refusal> {
         return Err(Refusal::NothingMoves(follower));
     }
     Ok(())
+}
+
+/// Note where the stamps part the rows into sessions of hardly any rows.
+fn many_sessions(sessions: &[Session]) -> Option<String> {
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    (sessions.len() > MANY_SESSIONS && rows < FEWEST_ROWS * sessions.len()).then(|| {
+        format!(
+            "{} sessions of {} rows on the mean: time that steps by more than {SESSION_GAP_PERIODS} of its usual \
+             steps, or back, begins one; are the stamps those of the rows?",
+            sessions.len(),
+            rows / sessions.len()
+        )
+    })
 }
 
 /// The sessions of a log.
