@@ -25,9 +25,8 @@ const LONGEST: usize = 64;
 /// Where runs are shorter than this no bench puts the load on in such steps. *Guess*.
 const NO_STEPS_OF_A_BENCH: usize = 5;
 /// Share of what the error changes by from run to run that it changes by in the very row where the load does: below,
-/// the load goes on between.
-/// *Guess*.
-pub(super) const WITHIN_THE_ROW: f64 = 0.5;
+/// the load goes on between. *Guess*.
+const WITHIN_THE_ROW: f64 = 0.5;
 
 /// Readings go on by this number of counts from one to the next, at the median, where it is not the counts that make an
 /// angle stand. *Guess*.
@@ -42,9 +41,44 @@ const SAME: f64 = 1e-13;
 /// Names channels that are repeated from row to row: a straight line takes the place of what is repeated of a torque,
 /// and rows that repeat an angle are left out.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    check_torque(sessions, findings);
-    for channel in [Quantity::Generator, Quantity::Output] {
-        check_angle(sessions, channel, gear, findings);
+    for channel in [Quantity::Torque, Quantity::Generator, Quantity::Output] {
+        let values: Vec<Vec<f64>> = sessions
+            .iter()
+            .map(|session| match channel {
+                Quantity::Torque => session.torque_n_m.clone().unwrap_or_default(),
+                Quantity::Generator => session.generator_rad.clone(),
+                _ => session.output_rad(gear.ratio),
+            })
+            .collect();
+        let of: Vec<Runs> = values.iter().map(|values| runs_of(values)).collect();
+        let Some((every, fault)) = rhythm(sessions, &of) else { continue };
+        let is_torque = channel == Quantity::Torque;
+        let is_as_it_was = if is_torque {
+            every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of)
+        } else {
+            values.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| counts(angle, runs))
+        };
+        if is_as_it_was {
+            continue;
+        }
+        let (treatment, meanwhile) = if is_torque {
+            (Treatment::Repaired, ", while the load goes on: a straight line from one to the next stands in")
+        } else {
+            (Treatment::Masked, " while the drive moves on: rows that repeat one are left out")
+        };
+        findings.add(Some(fault), channel, treatment, |_| {
+            format!("the {channel} has a new value in one of {every} rows, and is repeated in the others{meanwhile}")
+        });
+        if is_torque {
+            for (session, runs) in sessions.iter_mut().zip(&of) {
+                let Some(torque) = &mut session.torque_n_m else { continue };
+                runs.windows(2).for_each(|pair| straight(torque, pair[0].start, pair[1].start));
+            }
+        } else {
+            // Where it stands for longer, it is the drive that stands.
+            let short = |runs: &Runs| runs.clone().into_iter().filter(|run| run.len() <= 2 * every);
+            leave_out_rows(sessions, of.iter().map(|runs| short(runs).flat_map(|run| run.start + 1..run.end)));
+        }
     }
 }
 
@@ -73,79 +107,13 @@ fn rhythm(sessions: &[Session], of: &[Runs]) -> Option<(usize, Fault)> {
     fault.map(|fault| (every, Fault { rows, measures, ..fault }))
 }
 
-fn check_angle(sessions: &mut [Session], channel: Quantity, gear: &Gear, findings: &mut Findings) {
-    let angle = |session: &Session| match channel {
-        Quantity::Generator => session.generator_rad.clone(),
-        _ => session.output_rad(gear.ratio),
-    };
-    let angles: Vec<Vec<f64>> = sessions.iter().map(angle).collect();
-    let of: Vec<Runs> = angles.iter().map(|angle| runs_of(angle)).collect();
-    let Some((every, fault)) = rhythm(sessions, &of) else { return };
-    let of_counts = angles.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| {
-        let mut steps: Vec<f64> =
-            runs.windows(2).map(|pair| (angle[pair[1].start] - angle[pair[0].start]).abs()).collect();
-        lattice(angle).is_some_and(|count| {
-            let off = |step: &f64| (step / count - (step / count).round()).abs();
-            let whole = median_of(&mut steps.iter().map(off).collect::<Vec<f64>>()) < WHOLE;
-            whole && median_of(&mut steps) < COUNTS * count
-        })
-    });
-    if of_counts {
-        return;
-    }
-    findings.add(Some(fault), channel, Treatment::Masked, |_| {
-        format!(
-            "the {channel} has a new value in one of {every} rows, and is repeated in the others while the drive moves \
-             on: rows that repeat one are left out"
-        )
-    });
-    // Where it stands for longer, it is the drive that stands.
-    let repeats = |runs: &Runs| {
-        let short = runs.iter().filter(|run| run.len() <= 2 * every);
-        short.flat_map(|run| run.start + 1..run.end).collect::<Vec<usize>>()
-    };
-    leave_out_rows(sessions, of.iter().map(repeats));
-}
-
-fn check_torque(sessions: &mut [Session], findings: &mut Findings) {
-    let torques = sessions.iter().map(|session| session.torque_n_m.as_deref().unwrap_or_default());
-    let of: Vec<Runs> = torques.map(runs_of).collect();
-    let Some((every, fault)) = rhythm(sessions, &of) else { return };
-    if every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of) {
-        return;
-    }
-    findings.add(Some(fault), Quantity::Torque, Treatment::Repaired, |_| {
-        format!(
-            "the torque has a new value in one of {every} rows, and is repeated in the others, while the load goes on: \
-             a straight line from one to the next stands in"
-        )
-    });
-    for (session, runs) in sessions.iter_mut().zip(&of) {
-        let Some(torque) = &mut session.torque_n_m else { continue };
-        runs.windows(2).for_each(|pair| straight(torque, pair[0].start, pair[1].start));
-    }
-}
-
-/// A change of the torque from one run of rows to the next.
-pub(super) struct Change {
-    /// Number of rows before and after it.
-    pub rows: [usize; 2],
-    /// Torque before and after, N·m.
-    pub load: [f64; 2],
-    /// Change of the error in the row of the change, and from the mean of the one run to that of the other, rad.
-    pub within: f64,
-    pub in_all: f64,
-}
-
-/// The changes from run to run of a session with torque.
-pub(super) fn changes_of(session: &Session, runs: &[Range<usize>]) -> impl Iterator<Item = Change> {
-    let torque = session.torque_n_m.as_deref().unwrap_or_default();
-    let level = |rows: &Range<usize>| session.error_rad[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
-    runs.windows(2).map(move |pair| Change {
-        rows: [pair[0].len(), pair[1].len()],
-        load: [torque[pair[0].start], torque[pair[1].start]],
-        within: session.error_rad[pair[1].start] - session.error_rad[pair[1].start - 1],
-        in_all: level(&pair[1]) - level(&pair[0]),
+/// Whether an angle stands because it is read in coarse counts.
+fn counts(angle: &[f64], runs: &[Range<usize>]) -> bool {
+    let steps = runs.windows(2).map(|pair| (angle[pair[1].start] - angle[pair[0].start]).abs());
+    lattice(angle).is_some_and(|count| {
+        let mut steps: Vec<f64> = steps.map(|step| step / count).collect();
+        let mut off: Vec<f64> = steps.iter().map(|step| (step - step.round()).abs()).collect();
+        median_of(&mut off) < WHOLE && median_of(&mut steps) < COUNTS
     })
 }
 
@@ -153,12 +121,16 @@ pub(super) fn changes_of(session: &Session, runs: &[Range<usize>]) -> impl Itera
 /// changes its sign the flank does, and those do not count.
 fn goes_on_between(sessions: &[Session], of: &[Runs]) -> bool {
     let (mut within, mut in_all) = (0.0, 0.0);
-    for change in sessions.iter().zip(of).flat_map(|(session, runs)| changes_of(session, runs)) {
-        let [low, high] = change.load;
-        if low * high > 0.0 {
-            // Large changes say more than small ones.
-            within += (high - low) * change.within;
-            in_all += (high - low) * change.in_all;
+    for (session, runs) in sessions.iter().zip(of) {
+        let (torque, error) = (session.torque_n_m.as_deref().unwrap_or_default(), &session.error_rad);
+        let level = |rows: &Range<usize>| error[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
+        for pair in runs.windows(2) {
+            let [low, high] = [torque[pair[0].start], torque[pair[1].start]];
+            if low * high > 0.0 {
+                // Large changes say more than small ones.
+                within += (high - low) * (error[pair[1].start] - error[pair[1].start - 1]);
+                in_all += (high - low) * (level(&pair[1]) - level(&pair[0]));
+            }
         }
     }
     in_all > 0.0 && within < WITHIN_THE_ROW * in_all

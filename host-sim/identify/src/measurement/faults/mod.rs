@@ -22,7 +22,6 @@
 //! | torque repeated, one value in this many rows | a straight line between the new ones |
 //! | angle repeated so | rows that repeat it left out |
 //! | temperature frozen | straight line, or channel left out |
-//! | torque in coarse steps | read off where it goes from one to the next |
 //! | single rows out | rows left out (torque, temperature: mended) |
 //! | the logger stands still while its time counts on | time made anew from the motion |
 //! | an angle leaps by whole motor turns, in a row or between sessions | turns taken out |
@@ -30,10 +29,9 @@
 //! | angles read at different instants | rows weigh what their speed leaves of them; rows read far apart left out |
 //! | index jump | step taken out |
 //! | drift | straight line in time taken out |
-//! | coarse resolution, implausible time | named |
+//! | coarse resolution of an angle or of the torque, implausible time | named |
 
 pub(super) mod clock;
-pub(super) mod coarse_torque;
 pub(super) mod drift;
 pub(super) mod frozen;
 pub(super) mod held;

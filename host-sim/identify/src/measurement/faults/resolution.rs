@@ -1,7 +1,10 @@
 //! A resolution so coarse that no noise blurs it.
 
+use std::collections::HashSet;
+
 use super::lattice::lattice;
-use super::{ARCSEC, Findings, throughout};
+use super::steps::largest_torque;
+use super::{ARCSEC, Findings, runs, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Treatment};
@@ -18,11 +21,8 @@ const BLURRED: f64 = 0.7;
 
 /// A step is real if the output leaves this share of it as noise… *Guess*: half of the 0.29 that rounding leaves.
 const SEEN: f64 = 0.15;
-/// …or the channel stands in this share of the rows while the other one moves… *Guess*: a motion without a lattice
-/// stands nowhere.
-const STANDS: f64 = 0.3;
-/// …or, in even motion, its changes from row to row are uneven by a step in this share. *Guess*: an exact one is uneven
-/// nowhere.
+/// …or, in even motion, the channel's changes from row to row are uneven by a step in this share. *Guess*: an exact one
+/// is uneven nowhere.
 const UNEVEN: f64 = 0.1;
 /// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in
 /// the error, which differs by 0.4 steps on the mean from one reading to another: where half of them differ by less
@@ -32,33 +32,35 @@ const ROUNDED: f64 = 0.1;
 /// by just about as much, and a later one is not. *Guess*: octaves, of which one is not near a whole number.
 const APART: [usize; 4] = [1, 2, 4, 8];
 
+/// Steps of a torque of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
+const LEAST_STEP: f64 = 0.004;
+/// Steps are those of a sensor, and not weights that somebody put on and wrote down, if there are this many of them, …
+/// *Guess*: nobody writes down as many weights.
+const MANY_STEPS: usize = 12;
+/// … and this share of the runs of one value is shorter than [`TORN_ROWS`] or goes on to the next step. *Guess*: weights
+/// that are put on by hand are neither.
+const TORN: f64 = 0.2;
+/// Rows of a run that noise or a change has torn, less than. *Guess*: no weight is put on for so short.
+const TORN_ROWS: usize = 3;
+
 /// Resolutions that show in the data, in rad at the output.
 pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
     let Some((session, noise)) = longest(sessions) else { return Vec::new() };
     let (generator, output) = (&session.generator_rad, session.output_rad(gear.ratio));
-    let share = |rows: &[bool]| rows.iter().filter(|is| **is).count() as f64 / rows.len().max(1) as f64;
-    // Round-off of an output that is the sum of two columns is no motion.
-    let stands = |values: &[f64], others: &[f64], least: f64| {
-        let moved = |v: &[f64], row: usize| (v[row] - v[row - 1]).abs() > least;
-        let others_move = (1..values.len()).filter(|row| moved(others, *row));
-        share(&others_move.map(|row| !moved(values, row)).collect::<Vec<bool>>())
-    };
     let uneven = |values: &[f64], step: f64| {
-        let bends = values.windows(3).map(|v| (v[2] - 2.0 * v[1] + v[0]).abs());
-        share(&bends.map(|bend| bend > 0.5 * step).collect::<Vec<bool>>())
+        let bends = values.windows(3).filter(|v| (v[2] - 2.0 * v[1] + v[0]).abs() > 0.5 * step).count();
+        bends as f64 >= UNEVEN * values.len() as f64
     };
     let mut found = Vec::new();
     let (channel, measured) =
         if error_recorded { (Quantity::Error, &session.error_rad) } else { (Quantity::Output, &output) };
     if let Some(step) = lattice(measured)
-        && (noise >= SEEN * step
-            || uneven(measured, step) >= UNEVEN
-            || stands(measured, generator, 1e-3 * step) >= STANDS)
+        && (noise >= SEEN * step || uneven(measured, step))
     {
         found.push((channel, step));
     }
     if let Some(step) = lattice(generator)
-        && (uneven(generator, step) >= UNEVEN || stands(generator, &output, 1e-3 * step) >= STANDS)
+        && uneven(generator, step)
         && differs(generator, &session.error_rad, step) >= ROUNDED * step / gear.ratio.abs()
     {
         found.push((Quantity::Generator, step / gear.ratio.abs()));
@@ -73,8 +75,7 @@ fn longest(sessions: &[Session]) -> Option<(&Session, f64)> {
 }
 
 /// By how much the error differs, at the median, from one row to another where a channel has moved by a step or more,
-/// rad: at that distance of
-/// [`APART`] where it differs most.
+/// rad: at that distance of [`APART`] where it differs most.
 fn differs(channel: &[f64], error: &[f64], step: f64) -> f64 {
     let at = |apart: usize| {
         let moved = (apart..channel.len()).filter(|row| (channel[*row] - channel[row - apart]).abs() > 0.5 * step);
@@ -110,6 +111,29 @@ pub(in crate::measurement) fn check(
         });
     }
     sessions.iter_mut().for_each(|session| session.coarse_rad = coarsest);
+}
+
+/// Names a torque that a sensor writes in steps that matter. Steps of weights that are put on are the load itself.
+pub(in crate::measurement) fn check_torque(sessions: &[Session], findings: &mut Findings) {
+    let torques = || sessions.iter().filter_map(|session| session.torque_n_m.as_deref());
+    // A session of few loads shows a multiple of the step.
+    let Some(step) = torques().filter_map(lattice).min_by(f64::total_cmp) else { return };
+    let steps: HashSet<i64> = torques().flatten().map(|torque| (torque / step).round() as i64).collect();
+    if step < LEAST_STEP * largest_torque(sessions) || steps.len() < MANY_STEPS {
+        return;
+    }
+    let (mut count, mut torn) = (0, 0);
+    for torque in torques() {
+        for pair in runs(torque, |a, b| a == b).windows(2) {
+            let by_one = (torque[pair[1].start] - torque[pair[0].start]).abs() < 1.5 * step;
+            count += 1;
+            torn += usize::from(by_one || pair[0].len() < TORN_ROWS);
+        }
+    }
+    let fault = throughout(sessions, FaultName::Quantisation).filter(|_| torn as f64 >= TORN * f64::from(count));
+    findings.add(fault, Quantity::Torque, Treatment::Kept, |_| {
+        format!("the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen")
+    });
 }
 
 #[cfg(test)]
@@ -161,5 +185,32 @@ mod tests {
         // Steps of 0.1 rad of the generator are 206 arcsec at the output.
         let found = of_generator(session(6000, |k| 0.037 * k, |psi| 0.1 * (psi / 0.1).floor()));
         assert!((found.expect("coarse") * RATIO - 0.1).abs() < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn steps_of_a_sensor_are_named_and_weights_are_not() {
+        let mut random = fastrand::Rng::with_seed(2);
+        let levels: Vec<f64> = (0..60).map(|_| 25.0 * (2.0 * random.f64() - 1.0)).collect();
+        let named = |step: f64, load: &dyn Fn(f64) -> f64| {
+            let written = (0..6000).map(|k| (load(0.01 * f64::from(k)) / step).round() * step).collect();
+            let generator_rad = (0..6000).map(|k| 0.04 * f64::from(k)).collect();
+            let (line, error_rad) = ((2..6002).collect(), vec![0.0; 6000]);
+            let session = Session { line, generator_rad, error_rad, torque_n_m: Some(written), ..Session::default() };
+            let mut findings = Findings::default();
+            check_torque(&[session], &mut findings);
+            findings.faults.pop().map(|fault| (fault.name, fault.channel, fault.treatment))
+        };
+        let quantisation = Some((FaultName::Quantisation, Some(Quantity::Torque), Treatment::Kept));
+        // Put on within three rows.
+        let put_on = |t: f64| {
+            let (at, since) = ((t as usize).min(58), (t.fract() / 0.03).min(1.0));
+            levels[at] + since * (levels[at + 1] - levels[at])
+        };
+        assert_eq!(named(1.0, &put_on), quantisation);
+        assert_eq!(named(1.0, &|t| levels[(t as usize).min(59)]), None);
+        let swings = |t: f64| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
+        assert_eq!(named(5.0, &swings), quantisation);
+        // Digits are no steps.
+        assert_eq!(named(1e-3, &swings), None);
     }
 }
