@@ -17,8 +17,8 @@ const STEADY: f64 = 0.25;
 const EXTRA_ROWS: f64 = 0.8;
 /// …and the output takes part in it, within this share. *Guess*: clearance and wind-up take a part of it.
 const TOGETHER: f64 = 0.3;
-/// In one row the generator moves by this many times its own scatter, and in a leap both angles do. *Guess*: then the
-/// pace of a row is known to an eighth.
+/// In one row the generator moves by this many times its own scatter. *Guess*: then the pace of a row is known to an
+/// eighth.
 const OVER_NOISE: f64 = 8.0;
 /// From this number of leaps on they are stalls… *Guess*: a few may be something else.
 const FEWEST: usize = 8;
@@ -68,13 +68,9 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
     let (time, generator, output) =
         (log.get(Quantity::Time)?, log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
     let period_s = clock::period(log)?;
-    // Scatter of the motion at the generator, from third differences that few leaps do not move.
-    let scatter = |values: &[f64]| {
-        let third = values.windows(4).map(|v| (v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]).abs()).collect::<Vec<f64>>();
-        median_of(&mut sampled(&third))
-    };
-    let least = OVER_NOISE * scatter(generator);
-    let least_leap = least.max(OVER_NOISE * gear.ratio.abs() * scatter(output));
+    // Scatter of the generator's motion, from third differences that few leaps do not move.
+    let third = generator.windows(4).map(|v| (v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]).abs()).collect::<Vec<f64>>();
+    let least = OVER_NOISE * median_of(&mut sampled(&third));
     let (mut found, mut tested) = (Vec::new(), 0);
     for row in AROUND + 1..log.len().saturating_sub(AROUND) {
         let near = row - AROUND..=row + AROUND;
@@ -97,8 +93,7 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         let dt = time[row] - time[row - 1];
         let extra_s = (generator[row] - generator[row - 1]) / usual - dt;
         let by_output = (output[row] - output[row - 1]) * gear.ratio / usual - dt;
-        let is_seen = extra_s * usual.abs() > least_leap;
-        if extra_s > EXTRA_ROWS * period_s && is_seen && (by_output - extra_s).abs() < TOGETHER * extra_s {
+        if extra_s > EXTRA_ROWS * period_s && (by_output - extra_s).abs() < TOGETHER * extra_s {
             found.push((row, extra_s));
         }
     }
