@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use super::lattice::lattice;
-use super::{Findings, leave_out_rows, runs, straight, throughout};
+use super::{Findings, leave_out_rows, rhythm, runs, straight, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
@@ -51,7 +51,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             })
             .collect();
         let of: Vec<Runs> = values.iter().map(|values| runs_of(values)).collect();
-        let Some((every, fault)) = rhythm(sessions, &of) else { continue };
+        let Some((every, fault)) = repeats(sessions, &of) else { continue };
         let is_torque = channel == Quantity::Torque;
         let is_as_it_was = if is_torque {
             every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of)
@@ -92,19 +92,16 @@ fn runs_of(values: &[f64]) -> Runs {
 }
 
 /// Rows from one new value to the next, if most runs of one value are as long; with the fault of it, to be completed.
-fn rhythm(sessions: &[Session], of: &[Runs]) -> Option<(usize, Fault)> {
+fn repeats(sessions: &[Session], of: &[Runs]) -> Option<(usize, Fault)> {
     // The first and the last of a session are cut.
-    let inner = || of.iter().flat_map(|runs| runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default());
-    let mut lengths: Vec<f64> = inner().map(|run| run.len() as f64).collect();
-    let every = median_of(&mut lengths) as usize;
-    let regular = inner().filter(|run| run.len() == every || run.len() == 2 * every).count();
-    let is_one = lengths.len() >= FEWEST_RUNS
-        && (2..=LONGEST).contains(&every)
-        && (regular as f64) >= REGULAR * lengths.len() as f64;
+    let inner = of.iter().flat_map(|runs| runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default());
+    let lengths: Vec<f64> = inner.map(|run| run.len() as f64).collect();
+    let enough = lengths.len() >= FEWEST_RUNS;
+    let every = rhythm(lengths, REGULAR, |rows, every| rows == every || rows == 2.0 * every)?;
     let rows = of.iter().flatten().map(|run| run.len() as u64 - 1).sum();
     let measures = Measures { every_rows: Some(every as u64), ..Measures::default() };
-    let fault = throughout(sessions, FaultName::FrozenChannel).filter(|_| is_one);
-    fault.map(|fault| (every, Fault { rows, measures, ..fault }))
+    let fault = throughout(sessions, FaultName::FrozenChannel).filter(|_| enough && every <= LONGEST)?;
+    Some((every, Fault { rows, measures, ..fault }))
 }
 
 /// Whether an angle stands because it is read in coarse counts.

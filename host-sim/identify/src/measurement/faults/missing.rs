@@ -1,6 +1,6 @@
 //! Values that were not recorded, for a while or in most rows.
 
-use super::{Findings, marked, straight};
+use super::{Findings, marked, rhythm, straight};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::log::Log;
@@ -20,7 +20,7 @@ fn fill_slower(log: &mut Log, notes: &mut Vec<String>) {
     for channel in [Quantity::Torque, Quantity::Temperature, Quantity::Orientation] {
         let Some(values) = log.get_mut(channel) else { continue };
         let there: Vec<usize> = (0..values.len()).filter(|row| values[*row].is_finite()).collect();
-        let Some(every) = rhythm(&there) else { continue };
+        let Some(every) = period_rows(&there) else { continue };
         // Beyond two of its periods values are missing, as for any channel.
         let near = there.windows(2).filter(|pair| pair[1] - pair[0] <= 2 * every);
         near.for_each(|pair| straight(values, pair[0], pair[1]));
@@ -36,12 +36,9 @@ fn fill_slower(log: &mut Log, notes: &mut Vec<String>) {
 }
 
 /// One value in how many rows, if the rows with a value come regularly.
-fn rhythm(there: &[usize]) -> Option<usize> {
-    let mut distances: Vec<usize> = there.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    distances.sort_unstable();
-    let usual = distances.get(distances.len() / 2).copied().filter(|_| there.len() >= FEWEST)?;
-    let near = distances.iter().filter(|distance| distance.abs_diff(usual) <= 1).count();
-    (usual >= 2 && near as f64 >= REGULAR * distances.len() as f64).then_some(usual)
+fn period_rows(there: &[usize]) -> Option<usize> {
+    let distances = there.windows(2).map(|pair| (pair[1] - pair[0]) as f64).collect();
+    rhythm(distances, REGULAR, |distance, every| (distance - every).abs() <= 1.0).filter(|_| there.len() >= FEWEST)
 }
 
 /// Fills short holes of time, torque, temperature and orientation, leaves out a channel of which more than half is
@@ -112,8 +109,9 @@ mod tests {
     #[test]
     fn a_slower_channel_is_distinguished_from_holes() {
         let every = |n: usize| -> Vec<f64> { (0..400).map(|k| if k % n == 3 { k as f64 } else { f64::NAN }).collect() };
-        let rhythm_of =
-            |values: &[f64]| rhythm(&(0..values.len()).filter(|row| values[*row].is_finite()).collect::<Vec<usize>>());
+        let rhythm_of = |values: &[f64]| {
+            period_rows(&(0..values.len()).filter(|row| values[*row].is_finite()).collect::<Vec<usize>>())
+        };
         assert_eq!(rhythm_of(&every(10)), Some(10));
         assert_eq!(rhythm_of(&every(200)), None);
         let holes: Vec<f64> = (0..400).map(|k| if k % 7 == 3 { f64::NAN } else { 1.0 }).collect();

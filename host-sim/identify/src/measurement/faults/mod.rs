@@ -134,6 +134,13 @@ fn runs(values: &[f64], same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
     found
 }
 
+/// The usual one of distances of rows, two at least, if this share of them is `near` it.
+fn rhythm(mut distances: Vec<f64>, share: f64, near: impl Fn(f64, f64) -> bool) -> Option<usize> {
+    let every = median_of(&mut distances).round();
+    let regular = distances.iter().filter(|distance| near(**distance, every)).count();
+    (every >= 2.0 && regular as f64 >= share * distances.len() as f64).then_some(every as usize)
+}
+
 /// Puts a straight line between the values of two rows.
 fn straight(values: &mut [f64], from: usize, to: usize) {
     let (low, high) = (values[from], values[to]);

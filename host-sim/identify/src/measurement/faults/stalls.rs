@@ -1,7 +1,7 @@
 //! A logger that stands still now and then while its time counts on: the angles leap over several rows' worth of
 //! motion, both of them, and the column of time does not show it.
 
-use super::{Findings, add_steps, clock};
+use super::{Findings, add_steps, clock, rhythm};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
@@ -38,7 +38,10 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         return;
     }
     let size_s = median_of(&mut leaps.iter().map(|(_, extra_s)| *extra_s).collect::<Vec<f64>>());
-    let every = rhythm(log, &leaps);
+    // Some are not seen: the rhythm is the distance of neighbours in lines, others are whole multiples of it.
+    let distances = leaps.windows(2).map(|pair| (log.line[pair[1].0] - log.line[pair[0].0]) as f64).collect();
+    let every =
+        rhythm(distances, REGULAR, |lines, every| (lines / every - (lines / every).round()).abs() * every < 1.5);
     let fault = log.fault(FaultName::Stalls, leaps.iter().map(|(row, _)| *row));
     let all = match every {
         // Where the motion does not show it, as long as elsewhere.
@@ -98,16 +101,6 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         }
     }
     Some((found, tested, period_s))
-}
-
-/// Every how many lines stalls come, if they come regularly.
-fn rhythm(log: &Log, leaps: &[Leap]) -> Option<usize> {
-    let mut distances: Vec<f64> =
-        leaps.windows(2).map(|pair| (log.line[pair[1].0] - log.line[pair[0].0]) as f64).collect();
-    let every = median_of(&mut distances).round();
-    // Some are not seen: the rhythm is the distance of neighbours, others are whole multiples of it.
-    let regular = distances.iter().filter(|d| (**d / every - (**d / every).round()).abs() * every < 1.5).count();
-    (every >= 2.0 && regular as f64 >= REGULAR * distances.len() as f64).then_some(every as usize)
 }
 
 /// The same leaps, and one of the usual size in each row where the rhythm of its session asks for it and the motion
