@@ -11,7 +11,7 @@ use super::steps::largest_torque;
 use crate::least_squares::add_scaled;
 use crate::linear::{Gram, Prior, solve};
 use crate::measurement::gear::Gear;
-use crate::measurement::{Session, directions};
+use crate::measurement::{Session, TURNED_BACK_RAD, directions, turns};
 use flexspline_base::robust::{median_and_std, rms};
 
 /// Rows that a fit uses at most, spread evenly. *Guess*: it bounds the time.
@@ -88,27 +88,18 @@ impl<'a> StateModel<'a> {
         self.flank[session][row]
     }
 
-    /// Rows, by session, at which the generator has gone on so far since it turned back that clearance is taken up.
+    /// Rows, by session, at which the generator has gone on so far since it turned back that clearance is taken up, and
+    /// does not turn back within a few rows.
     pub fn settled(&self) -> Vec<Vec<bool>> {
-        let of = |(session, flank): (&Session, &Vec<f64>)| {
-            let mut turned = session.generator_rad.first().copied().unwrap_or(0.0);
-            let turns_soon = |row: usize| {
-                let soon = (row + BEFORE).min(session.len() - 1);
-                flank[soon] != flank[row]
+        let of = |session: &Session| -> Vec<bool> {
+            let psi = &session.generator_rad;
+            let far = |((_, turned_at), psi): (&(f64, f64), &f64)| {
+                (psi - turned_at).abs() > WIDEST_CLEARANCE_RAD * self.ratio.abs()
             };
-            (0..session.len())
-                .map(|row| {
-                    if turns_soon(row) {
-                        return false;
-                    }
-                    if row > 0 && flank[row] != flank[row - 1] {
-                        turned = session.generator_rad[row];
-                    }
-                    (session.generator_rad[row] - turned).abs() > WIDEST_CLEARANCE_RAD * self.ratio.abs()
-                })
-                .collect()
+            let far: Vec<bool> = turns(psi, TURNED_BACK_RAD).iter().zip(psi).map(far).collect();
+            (0..far.len()).map(|row| far[row] && far[(row + BEFORE).min(far.len() - 1)]).collect()
         };
-        self.sessions.iter().zip(&self.flank).map(of).collect()
+        self.sessions.iter().map(of).collect()
     }
 
     /// The columns at a row.

@@ -1,12 +1,12 @@
 //! Steps of the error that last: an encoder that lost its index, or a drive that has ratcheted.
 //!
-//! A step is made within one row, faster than an output at rest could give it (a dwell in the clearance changes the
+//! A step happens within one row, faster than an output at rest could give it (a dwell in the clearance changes the
 //! error by no more than the generator moves), and it stays, through reversals and at any load. Clearance that is
-//! thrown over, wind-up and damaged teeth do not: they come back with the state of the drive. A counter that loses
-//! counts may be set right before the next session: then its steps stay until their session ends.
+//! crossed, wind-up and damaged teeth do not: they come back with the state of the drive. A counter that loses counts
+//! may be set right before the next session: then its steps stay until their session ends.
 
 use super::state::{Extra, StateFit, StateModel};
-use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, level, of_rows, whole_pitches};
+use super::{ARCSEC, Findings, of_rows, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, ToothStep, Treatment};
@@ -35,8 +35,6 @@ const TAKEN_BACK: f64 = 0.35;
 /// It is taken back by several together if their sum is less than this share of the largest. *Guess*: less than for
 /// two, as of many some cancel by chance.
 const TAKEN_BACK_TOGETHER: f64 = 0.15;
-/// If this number of other steps are as large, a step is a crossing of the backlash too. *Guess*: one may be chance.
-const ELSEWHERE: usize = 2;
 /// No step smaller than this is looked for, rad. *Guess*, raised from 2 arcsec for fewer false alarms.
 const LEAST_RAD: f64 = 5.0 * ARCSEC;
 /// Nor one that is not seen from one row to the next: this many standard deviations of the white noise. *Guess*: one
@@ -44,8 +42,6 @@ const LEAST_RAD: f64 = 5.0 * ARCSEC;
 const SEEN: f64 = 6.0;
 /// Steps that are looked for at a time. *Guess*: an index is lost a few times in a recording.
 const AT_ONCE: usize = 8;
-/// The same where each session has steps of its own. *Guess*: twice as many.
-const AT_ONCE_IN_ALL: usize = 16;
 /// Rounds of looking. *Guess*: each finds smaller ones, few to the last.
 const ROUNDS: usize = 4;
 /// A step is that many whole tooth pitches if it differs by less than this share of one. *Guess*: pitch errors of fine
@@ -53,13 +49,11 @@ const ROUNDS: usize = 4;
 pub(super) const WHOLE_PITCH: f64 = 0.01;
 /// Load of this share of its largest holds the drive on one flank. *Guess*: above the friction of most drives.
 pub(super) const HELD: f64 = 0.1;
-/// A step above this may follow a reversal, rad: the clearance, and as much of wind-up, are traversed in less. *Guess*.
-const LONGEST_TRAVERSE_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
-/// A step above this needs no load to show that no flank was changed, rad. *Guess*: three arc-minutes, wider than the
-/// clearance of drives that are not worn.
+/// A step above this is no change of flank, rad. *Guess*: three arc-minutes, wider than the clearance of drives that
+/// are not worn.
 const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
-/// A change of load by this share of its largest, near the step, may be wind-up. *Guess*, lowered from 0.15
-/// likewise.
+/// A change of load by this share of its largest, near the step, may be wind-up. *Guess*, lowered from 0.15 for fewer
+/// false alarms.
 const LOAD_STEP: f64 = 0.03;
 /// Its noise alone changes it by no more than this many of its standard deviations. *Guess*: beyond any tail of noise.
 const LOAD_NOISE: f64 = 8.0;
@@ -68,11 +62,6 @@ const LOAD_PACE: f64 = 6.0;
 /// A step is separated from what it might be instead if it leaves less than this share of its misfit. *Guess*: with
 /// some thousand rows one per cent would do, were they independent.
 const CLEARLY_LESS: f64 = 0.95;
-/// A step that leaves less than this share of the misfit of a change of flank in its place is none. *Guess*.
-const DECIDES: f64 = 0.05;
-/// Medians of six rows before and after differ by no more than this many standard deviations of the white noise.
-/// *Chosen* (4 before) as [`TAKEN_BACK`].
-const LOCAL_NOISE: f64 = 2.2;
 /// A jump stands alone: this many rows before and after it change the error by less than half as much. *Guess*: longer
 /// than a traverse of the clearance.
 const APART: usize = 12;
@@ -96,6 +85,10 @@ impl StepPlace {
     fn reached(self, session: usize, row: usize) -> f64 {
         let stays = self.stays == Stays::ForGood || session == self.session;
         f64::from(u8::from(stays && (session, row) >= (self.session, self.row)))
+    }
+
+    fn is_near(self, other: StepPlace) -> bool {
+        other.session == self.session && other.row.abs_diff(self.row) < WINDOW / 2
     }
 }
 
@@ -126,17 +119,13 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     }
     for (place, size, std) in sure {
         let (session, size_arcsec) = (&sessions[place.session], size / ARCSEC);
+        let (line, time_s) = (session.line[place.row], session.time_s.as_ref().map(|time| time[place.row]));
         if let Some(pitch) = gear.tooth_pitch_rad.filter(|_| stays == Stays::ForGood) {
             let pitches = (size / pitch).round();
             if pitches != 0.0 && (size - pitches * pitch).abs() < (5.0 * std).max(WHOLE_PITCH * pitch) {
-                findings.tooth_steps.push(ToothStep {
-                    session: place.session,
-                    row: place.row,
-                    line: session.line[place.row],
-                    time_s: session.time_s.as_ref().map(|time| time[place.row]),
-                    size_arcsec,
-                    pitches: pitches as i32,
-                });
+                let StepPlace { session, row, .. } = place;
+                let pitches = pitches as i32;
+                findings.tooth_steps.push(ToothStep { session, row, line, time_s, size_arcsec, pitches });
                 continue;
             }
         }
@@ -191,19 +180,8 @@ fn likelier(sessions: &[Session], gear: &Gear) -> Option<FoundSteps> {
     if sessions.len() == 1 || !for_good.suspected {
         return Some(for_good);
     }
-    let to_the_end = seen.find(Stays::ToTheEnd);
-    let mut better = to_the_end.filter(|found| found.misfit < CLEARLY_LESS * for_good.misfit);
-    if let Some(found) = &mut better {
-        let steps = [found.sure.as_slice(), &found.doubtful].concat();
-        let (clear, doubtful): (Vec<Step>, Vec<Step>) =
-            found.doubtful.iter().copied().partition(|(place, ..)| seen.beyond_a_change_of_flank(&steps, *place));
-        // A flank that friction lets go stays to the end of a session, too, where the load is small.
-        let (loose, sure): (Vec<Step>, Vec<Step>) =
-            (found.sure.iter().copied()).partition(|(place, ..)| seen.may_let_go(*place));
-        (found.sure, found.doubtful) = ([sure, clear].concat(), [doubtful, loose].concat());
-        found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
-    }
-    Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
+    let better = |found: &FoundSteps| found.misfit < CLEARLY_LESS * for_good.misfit && !found.sure.is_empty();
+    Some(seen.find(Stays::ToTheEnd).filter(better).unwrap_or(for_good))
 }
 
 /// A recording with what is known of it.
@@ -217,65 +195,25 @@ struct Seen<'a> {
     settled: Vec<Vec<bool>>,
     /// Largest torque, N·m.
     largest: f64,
-    /// The flank, ±1, that the load of each row holds, 0 where it holds none, by session.
-    held: Vec<Option<Vec<f64>>>,
 }
 
 impl<'a> Seen<'a> {
     fn of(sessions: &'a [Session], gear: &'a Gear) -> Seen<'a> {
         let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
         let state = StateModel::new(sessions, gear);
-        let settled = state.settled();
-        let largest = largest_torque(sessions);
-        let held = sessions.iter().map(|session| flanks_held(session, largest)).collect();
-        Seen { sessions, gear, noise, state, settled, largest, held }
-    }
-
-    /// Whether the load at a place holds no flank, so that friction may have let go of one.
-    fn may_let_go(&self, place: StepPlace) -> bool {
-        self.held[place.session].as_ref().is_some_and(|held| held[place.row] == 0.0)
-    }
-
-    /// The fit of `columns` in the place of a step, together with the other steps.
-    fn beside_others(&self, steps: &[Step], place: StepPlace, columns: &[Extra]) -> Option<StateFit> {
-        let others = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place);
-        with_columns(others, columns, |columns| self.state.fit(columns))
+        Seen { sessions, gear, noise, settled: state.settled(), state, largest: largest_torque(sessions) }
     }
 
     /// All rows but the first of each session.
-    fn rows(&self) -> impl Iterator<Item = StepPlace> + '_ {
-        let of = |(session, of): (usize, &Session)| {
-            (1..of.len()).map(move |row| StepPlace { session, row, stays: Stays::ForGood })
-        };
+    fn rows(&self, stays: Stays) -> impl Iterator<Item = StepPlace> + '_ {
+        let of =
+            move |(session, of): (usize, &Session)| (1..of.len()).map(move |row| StepPlace { session, row, stays });
         self.sessions.iter().enumerate().flat_map(of)
-    }
-
-    /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps
-    /// are: the model without the step, to which the flank that the load holds is given instead.
-    fn beyond_a_change_of_flank(&self, steps: &[Step], place: StepPlace) -> bool {
-        if self.may_let_go(place) {
-            return false;
-        }
-        // The last flank that was held; 0 before there was one.
-        let lasting = |held: &Vec<f64>| -> Vec<f64> {
-            let last = |last: &mut f64, held: &f64| {
-                *last = if *held == 0.0 { *last } else { *held };
-                Some(*last)
-            };
-            held.iter().scan(0.0, last).collect()
-        };
-        let held: Vec<Option<Vec<f64>>> = self.held.iter().map(|held| held.as_ref().map(lasting)).collect();
-        let flank = |session: usize, row: usize| held[session].as_ref().map_or(0.0, |held| held[row]);
-        let with = |this: Extra| self.beside_others(steps, place, &[this]);
-        let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
-        step.misfit < DECIDES * flank.misfit
     }
 
     /// Steps that stay so long.
     fn find(&self, stays: Stays) -> Option<FoundSteps> {
-        let most = if stays == Stays::ForGood { AT_ONCE } else { AT_ONCE_IN_ALL };
-        let mut places = self.sudden(most);
-        places.iter_mut().for_each(|place| place.stays = stays);
+        let mut places = self.sudden(stays);
         let mut suspected = !places.is_empty();
         let mut rejected: Vec<StepPlace> = Vec::new();
         let (mut steps, mut misfit): (Vec<Step>, f64) = (Vec::new(), f64::INFINITY);
@@ -284,48 +222,32 @@ impl<'a> Seen<'a> {
             let fit = loop {
                 let fit = with_columns(places.iter().copied(), &[], |columns| self.state.fit(columns))?;
                 let first = fit.value.len() - places.len();
-                let strength = |k: usize| self.strength(places[k], fit.value[first + k], fit.std[first + k]);
-                let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
-                match weakest {
-                    Some(k) if strength(k) < 1.0 => {
-                        rejected.push(places.remove(k));
-                    }
+                let of_place = |(k, place): (usize, &StepPlace)| (*place, fit.value[first + k], fit.std[first + k]);
+                steps = places.iter().enumerate().map(of_place).collect();
+                let strengths = steps.iter().map(|step| self.strength(*step)).enumerate();
+                match strengths.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                    Some((k, strength)) if strength < 1.0 => rejected.push(places.remove(k)),
                     _ => break fit,
                 }
             };
-            let first = fit.value.len() - places.len();
-            steps = places.iter().enumerate().map(|(k, p)| (*p, fit.value[first + k], fit.std[first + k])).collect();
             misfit = fit.misfit;
             if round + 1 == ROUNDS {
                 break;
             }
             let known: Vec<StepPlace> = places.iter().chain(&rejected).copied().collect();
-            let more = self.standing_out(&fit, &places, &known);
+            let more = self.standing_out(&fit, &places, &known, stays);
             if more.is_empty() {
                 break;
             }
             suspected = true;
-            places.extend(more.into_iter().map(|place| StepPlace { stays, ..place }));
+            places.extend(more);
             places.sort_by_key(|place| (place.session, place.row));
         }
-        steps = match stays {
-            Stays::ForGood => lasting(steps),
-            // What is set right between sessions takes nothing back.
-            Stays::ToTheEnd => {
-                steps.chunk_by(|a, b| a.0.session == b.0.session).flat_map(|of| lasting(of.to_vec())).collect()
-            }
-        };
-        let unsaid = !steps.is_empty() && !says_flank(self.sessions);
-        let turned_over = |place: StepPlace, size: f64| unsaid && self.comes_elsewhere(place, size);
-        let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
-            !turned_over(*place, *size) && self.no_flank_was_changed(&steps, *place, *size)
-        });
-        // Where one step may be a change of flank, one of the other sign may be its way back.
-        let way_back = |(_, size, _): &Step| {
-            size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
-        };
-        let (back, sure): (Vec<Step>, Vec<Step>) = sure.into_iter().partition(way_back);
-        Some(FoundSteps { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
+        // Steps that are set right between sessions take nothing back.
+        let together = |a: &Step, b: &Step| stays == Stays::ForGood || a.0.session == b.0.session;
+        let steps: Vec<Step> = steps.chunk_by(together).flat_map(|of| lasting(of.to_vec())).collect();
+        let (sure, doubtful) = steps.iter().copied().partition(|step| self.no_flank_was_changed(&steps, *step));
+        Some(FoundSteps { sure, doubtful, stays, misfit, suspected })
     }
 
     /// The change of the error into a row.
@@ -340,8 +262,8 @@ impl<'a> Seen<'a> {
         ((generator[row] - generator[row - 1]) / self.gear.ratio).abs()
     }
 
-    /// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the
-    /// generator turned back.
+    /// The change of the error into a row beyond that of a dwell, 0 if less. An output dwells after the generator
+    /// turned back.
     fn beyond_dwell(&self, place: StepPlace) -> f64 {
         let change = self.change(place);
         if self.settled[place.session][place.row] {
@@ -351,16 +273,16 @@ impl<'a> Seen<'a> {
     }
 
     /// Rows into which the error changes more than anything smooth explains, the largest changes first.
-    fn sudden(&self, most: usize) -> Vec<StepPlace> {
-        let changes: Vec<f64> = self.rows().map(|place| self.change(place)).collect();
+    fn sudden(&self, stays: Stays) -> Vec<StepPlace> {
+        let changes: Vec<f64> = self.rows(stays).map(|place| self.change(place)).collect();
         let usual = median_and_std(&mut sampled(&changes)).1;
         let least = (SUDDEN * usual.max(self.noise)).max(LEAST_RAD);
-        let by = self.rows().map(|place| (place, self.beyond_dwell(place).abs()));
-        largest(by.filter(|(_, by)| *by > least).collect(), &[], most)
+        let by = self.rows(stays).map(|place| (place, self.beyond_dwell(place).abs()));
+        largest(by.filter(|(_, by)| *by > least).collect(), &[])
     }
 
     /// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
-    fn standing_out(&self, fit: &StateFit, places: &[StepPlace], known: &[StepPlace]) -> Vec<StepPlace> {
+    fn standing_out(&self, fit: &StateFit, places: &[StepPlace], known: &[StepPlace], stays: Stays) -> Vec<StepPlace> {
         let differences = |number: usize| -> Vec<f64> {
             let left = with_columns(places.iter().copied(), &[], |columns| self.state.left(fit, number, columns));
             let mut sums = vec![0.0; left.len() + 1];
@@ -381,134 +303,73 @@ impl<'a> Seen<'a> {
             let sharp = || self.beyond_dwell(place) * size.signum() > (1.0 - AGREES) * size.abs() - 4.0 * self.noise;
             (size.abs() > least && sharp()).then_some((place, size.abs()))
         };
-        largest(self.rows().filter_map(stands_out).collect(), known, AT_ONCE)
+        largest(self.rows(stays).filter_map(stands_out).collect(), known)
     }
 
     /// At least 1 for a step that lasts, is sudden, and is the same in both views.
-    fn strength(&self, place: StepPlace, size: f64, std: f64) -> f64 {
-        let (session, noise) = (&self.sessions[place.session], self.noise);
-        let wide = size.abs() > LONGEST_TRAVERSE_RAD;
-        if (!self.settled[place.session][place.row] && !wide) || others_change_as_much(session, place.row, size) {
-            return 0.0;
-        }
-        let change = self.change(place);
-        let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * self.motion(place);
-        let loaded = load_changes(session, place.row, self.largest) && !whole_pitches(size, self.gear, WHOLE_PITCH);
-        if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
-            return 0.0;
-        }
-        // Seen close by, so that a slow change is no step: medians of a few rows.
-        let few = 6.min(place.row).min(session.len() - place.row);
-        let local = level(&session.error_rad, place.row..place.row + few)
-            - level(&session.error_rad, place.row - few..place.row);
-        let near = &session.error_rad[place.row - few..place.row + few];
-        let mut paces: Vec<f64> = near.windows(2).map(|error| (error[1] - error[0]).abs()).collect();
-        let moves = few as f64 * median_of(&mut paces);
-        if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * noise + moves {
+    fn strength(&self, (place, size, std): Step) -> f64 {
+        let agrees = AGREES * size.abs() + 6.0 * self.noise + 0.5 * self.motion(place);
+        let is_seen = size.abs() >= LEAST_RAD.max(SEEN * self.noise);
+        let is_sudden = is_seen && (self.change(place) - size).abs() < agrees;
+        let session = &self.sessions[place.session];
+        let loaded = || load_changes(session, place.row, self.largest) && !whole_pitches(size, self.gear, WHOLE_PITCH);
+        if !is_sudden || loaded() || others_change_as_much(session, place.row, size) {
             return 0.0;
         }
         size.abs() / (LASTS * std).max(1e-300)
     }
 
-    /// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load
-    /// that nobody recorded.
-    fn comes_elsewhere(&self, place: StepPlace, size: f64) -> bool {
-        if size.abs() > WIDER_THAN_CLEARANCE_RAD {
-            return false;
-        }
-        let elsewhere = self.rows().filter(|other| {
-            let near = other.session == place.session && other.row.abs_diff(place.row) < WINDOW;
-            let as_much = (self.change(*other).abs() - size.abs()).abs() < TAKEN_BACK * size.abs();
-            !near && self.settled[other.session][other.row] && as_much
-        });
-        elsewhere.count() >= ELSEWHERE
-    }
-
-    /// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold
-    /// one: a change of flank is not.
-    fn lasts_under_load(&self, steps: &[Step], place: StepPlace, size: f64) -> bool {
-        let (sessions, held) = (self.sessions, HELD * self.largest);
-        let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
-        if held == 0.0 || loaded(place.session, place.row) {
-            return true;
-        }
-        let lasting = column(place);
-        let under_load = |s: usize, r: usize| if loaded(s, r) { lasting(s, r) } else { 0.0 };
-        let under_none = |s: usize, r: usize| if loaded(s, r) { 0.0 } else { lasting(s, r) };
-        let Some(fit) = self.beside_others(steps, place, &[&under_none, &under_load]) else { return false };
-        let seen = |k: usize| {
-            let (value, std) = (fit.value[fit.value.len() - k], fit.std[fit.std.len() - k]);
-            (value - size).abs() < AGREES * size.abs() && value.abs() > LASTS * std
+    /// Whether a step cannot be a change of flank: no clearance is so wide, or a load holds the flank there, and the
+    /// step leaves clearly less than what may come in its place, together with the other steps: a step at the same
+    /// angle, which goes back where the generator does, and the flank that the load last held.
+    fn no_flank_was_changed(&self, steps: &[Step], (place, size, _): Step) -> bool {
+        let held = |session: &Session, row: usize| {
+            let torque = session.torque_n_m.as_ref().filter(|_| self.largest > 0.0)?;
+            Some(if torque[row].abs() >= HELD * self.largest { torque[row].signum() } else { 0.0 })
         };
-        seen(1) && seen(2)
-    }
-
-    /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or
-    /// load held the flank, or no clearance is so wide.
-    fn no_flank_was_changed(&self, steps: &[Step], place: StepPlace, size: f64) -> bool {
-        let sessions = self.sessions;
         if size.abs() > WIDER_THAN_CLEARANCE_RAD {
             return true;
         }
-        if self.held[place.session].as_ref().is_some_and(|held| turns_over(held, place.row))
-            || !self.lasts_under_load(steps, place, size)
-        {
+        if held(&self.sessions[place.session], place.row) == Some(0.0) {
             return false;
         }
-        let here = sessions[place.session].generator_rad[place.row];
-        let mut crossings = 0;
-        for session in sessions {
-            let mut side = 0.0;
-            for psi in &session.generator_rad {
-                let away = psi - here;
-                if away.abs() > 0.5 {
-                    if side * away < 0.0 {
-                        crossings += 1;
-                    }
-                    side = away.signum();
-                }
-            }
-        }
-        if crossings >= 2 {
-            let in_time = |s: usize, r: usize| place.reached(s, r);
-            let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
-            let with = |this: Extra| self.beside_others(steps, place, &[this]);
-            let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
-            return time.misfit < CLEARLY_LESS * angle.misfit;
-        }
-        let session = &sessions[place.session];
-        let held = session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * self.largest);
-        // The same direction before and after, and a load that says which flank.
-        held && self.state.flank(place.session, place.row) == self.state.flank(place.session, place.row - 1)
+        let flanks = |session: &Session| -> Vec<f64> {
+            let last = |last: &mut f64, row: usize| {
+                *last = held(session, row).filter(|held| *held != 0.0).unwrap_or(*last);
+                Some(*last)
+            };
+            (0..session.len()).scan(0.0, last).collect()
+        };
+        let flanks: Vec<Vec<f64>> = self.sessions.iter().map(flanks).collect();
+        let here = self.sessions[place.session].generator_rad[place.row];
+        let at_angle = |s: usize, r: usize| f64::from(u8::from(self.sessions[s].generator_rad[r] >= here));
+        let of_load = |s: usize, r: usize| flanks[s][r];
+        let misfit = |this: Extra| {
+            let others = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place);
+            with_columns(others, &[this], |columns| self.state.fit(columns)).map(|fit| fit.misfit)
+        };
+        let less = |other: Extra| misfit(&column(place)) < misfit(other).map(|other| CLEARLY_LESS * other);
+        less(&at_angle) && less(&of_load)
     }
-}
-
-/// The flank, ±1, that the load of each row holds, its noise considered; 0 where it holds none. None without loads.
-fn flanks_held(session: &Session, largest: f64) -> Option<Vec<f64>> {
-    let torque = session.torque_n_m.as_ref().filter(|_| largest > 0.0)?;
-    let least = (HELD * largest).max(LOAD_NOISE * white_noise([torque.as_slice()]));
-    Some(torque.iter().map(|torque| if torque.abs() >= least { torque.signum() } else { 0.0 }).collect())
 }
 
 /// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion
 /// samples once, a flank that drag turns over until the drive slows down. Each is taken back once, by its nearest
-/// neighbour first.
+/// neighbours first.
 fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
-    let together = |run: &[Step], share: f64| {
-        let largest = run.iter().fold(0.0, |most: f64, (_, size, _)| most.max(size.abs()));
-        let sum: f64 = run.iter().map(|(_, size, _)| size).sum();
-        sum.abs() < share * largest
-    };
-    let apart = |a: StepPlace, b: StepPlace| (b.session - a.session, b.row.abs_diff(a.row));
-    loop {
-        let pairs = (0..steps.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
-        let there_and_back = pairs.filter(|(j, k)| together(&[steps[*j], steps[*k]], TAKEN_BACK));
-        let Some((j, k)) = there_and_back.min_by_key(|(j, k)| apart(steps[*j].0, steps[*k].0)) else { break };
-        steps.remove(k);
-        steps.remove(j);
-    }
-    for long in 3..=steps.len() {
-        while let Some(from) = steps.windows(long).position(|run| together(run, TAKEN_BACK_TOGETHER)) {
+    for long in 2..=steps.len() {
+        let share = if long == 2 { TAKEN_BACK } else { TAKEN_BACK_TOGETHER };
+        let cancel = |run: &[Step]| {
+            let largest = run.iter().fold(0.0, |most: f64, (_, size, _)| most.max(size.abs()));
+            run.iter().map(|(_, size, _)| size).sum::<f64>().abs() < share * largest
+        };
+        let apart = |run: &[Step]| {
+            let (first, last) = (run[0].0, run[long - 1].0);
+            (last.session - first.session, last.row.abs_diff(first.row))
+        };
+        loop {
+            let runs = steps.windows(long).enumerate().filter(|(_, run)| cancel(run));
+            let Some((from, _)) = runs.min_by_key(|(_, run)| apart(run)) else { break };
             steps.drain(from..from + long);
         }
     }
@@ -516,16 +377,12 @@ fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
 }
 
 /// The places of the largest values, apart from each other and from those known.
-fn largest(mut found: Vec<(StepPlace, f64)>, known: &[StepPlace], most: usize) -> Vec<StepPlace> {
+fn largest(mut found: Vec<(StepPlace, f64)>, known: &[StepPlace]) -> Vec<StepPlace> {
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut places: Vec<StepPlace> = Vec::new();
     for (place, _) in found {
-        let near = |other: &StepPlace| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
-        if !places.iter().chain(known).any(near) {
+        if places.len() < AT_ONCE && !places.iter().chain(known).any(|other| other.is_near(place)) {
             places.push(place);
-            if places.len() == most {
-                break;
-            }
         }
     }
     places.sort_by_key(|place| (place.session, place.row));
@@ -534,17 +391,8 @@ fn largest(mut found: Vec<(StepPlace, f64)>, known: &[StepPlace], most: usize) -
 
 /// Largest torque of either sign, N·m; 0 where none was recorded.
 pub(super) fn largest_torque(sessions: &[Session]) -> f64 {
-    sessions
-        .iter()
-        .filter_map(|s| s.torque_n_m.as_ref())
-        .flatten()
-        .fold(0.0, |most: f64, torque| most.max(torque.abs()))
-}
-
-/// Whether torque was recorded, and more of it than noise: then it says which flank carries.
-fn says_flank(sessions: &[Session]) -> bool {
-    let noise = white_noise(sessions.iter().filter_map(|session| session.torque_n_m.as_deref()));
-    largest_torque(sessions) > LOAD_NOISE * noise
+    let torques = sessions.iter().filter_map(|session| session.torque_n_m.as_ref()).flatten();
+    torques.fold(0.0, |most: f64, torque| most.max(torque.abs()))
 }
 
 /// Whether load changes at once, by more than its noise and its usual pace, near a row.
@@ -564,14 +412,6 @@ fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
 fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
     let near = row.saturating_sub(APART).max(1)..(row + APART + 1).min(session.len());
     near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
-}
-
-/// Whether a row, at which none is held, lies between one at which one flank is held and one of the other flank: there
-/// a flank is changed.
-fn turns_over(held: &[f64], row: usize) -> bool {
-    let is_held = |flank: &&f64| **flank != 0.0;
-    let (before, after) = (held[..row].iter().rev().find(is_held), held[row..].iter().find(is_held));
-    held[row] == 0.0 && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
 }
 
 #[cfg(test)]
@@ -606,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_is_set_right_between_sessions_is_told_and_put_right() {
+    fn a_counter_that_is_set_right_between_sessions_is_named_and_put_right() {
         let mut random = fastrand::Rng::with_seed(4);
         let one = |number: usize, random: &mut fastrand::Rng| {
             let time = || (0..2000).map(|k| 0.01 * f64::from(k));
@@ -666,8 +506,8 @@ mod tests {
             let gear = Gear::of_ratio(100.0);
             let seen = Seen::of(&sessions, &gear);
             let steps = [(at(0, 700), slip_arcsec * ARCSEC, ARCSEC), (at(1, change), 80.0 * ARCSEC, ARCSEC)];
-            assert!(seen.beyond_a_change_of_flank(&steps, at(0, 700)));
-            assert!(!seen.beyond_a_change_of_flank(&steps, at(1, change)));
+            assert!(seen.no_flank_was_changed(&steps, steps[0]));
+            assert!(!seen.no_flank_was_changed(&steps, steps[1]));
             let mut findings = Findings::default();
             check(&mut sessions.clone(), &gear, &mut findings);
             let found: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
@@ -680,37 +520,6 @@ mod tests {
         let session = session(vec![0.0; 400], vec![0.0; 400]);
         let inside = |row: usize| is_inside(&session, row);
         assert!(!inside(3) && !inside(395) && inside(WINDOW) && inside(200));
-    }
-
-    #[test]
-    fn between_loads_of_either_sign_a_flank_is_changed() {
-        let ramp: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) - 20.0).collect();
-        let there_and_back: Vec<f64> = (0..400).map(|k| 20.0 - (0.2 * f64::from(k) - 40.0).abs()).collect();
-        let turns = |torque: Vec<f64>, row: usize| {
-            turns_over(&flanks_held(&session(vec![0.0; 400], torque), 20.0).unwrap(), row)
-        };
-        assert!(turns(ramp.clone(), 210), "1 N·m, from -20 to 20");
-        assert!(!turns(ramp, 300), "10 N·m hold the flank");
-        assert!(!turns(there_and_back.iter().map(|t| t.abs()).collect(), 100), "never below nothing");
-    }
-
-    #[test]
-    fn a_step_that_comes_at_other_places_too_is_a_clearance_thrown_over() {
-        let mut error = vec![0.0; 900];
-        let step = 80.0 * ARCSEC;
-        error[200..].iter_mut().for_each(|e| *e += step);
-        error[400..].iter_mut().for_each(|e| *e -= step);
-        let settled = vec![vec![true; 900]];
-        let place = StepPlace { session: 0, row: 600, stays: Stays::ForGood };
-        let gear = Gear::of_ratio(100.0);
-        let elsewhere = |error: &[f64]| {
-            let sessions = [session(error.to_vec(), vec![0.0; 900])];
-            Seen { settled: settled.clone(), ..Seen::of(&sessions, &gear) }.comes_elsewhere(place, step)
-        };
-        error[600..].iter_mut().for_each(|e| *e += step);
-        assert!(elsewhere(&error));
-        error[400..600].iter_mut().for_each(|e| *e += step);
-        assert!(!elsewhere(&error), "one other place is no habit");
     }
 
     #[test]
