@@ -2,7 +2,7 @@
 
 use super::resolution::seen;
 use super::steps::{HELD, largest_torque};
-use super::{ARCSEC, Findings, farthest, leave_out, level, of_rows, rows_of};
+use super::{ARCSEC, Findings, farthest, leave_out_rows, level, of_rows, rows_of};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Treatment};
@@ -32,9 +32,6 @@ const TOOTH_RAD: f64 = 0.05;
 const FEW: usize = 4;
 /// Large, rad at the output: more than a tooth or a usual clearance gives. *Guess*: two arc-minutes.
 const LARGE_RAD: f64 = 120.0 * ARCSEC;
-/// Load changes at once if it does by this multiple of its usual pace. *Guess*: a load that swings evenly stays below
-/// 3.
-const LOAD_PACE: f64 = 10.0;
 /// A load that changes by this share of its largest within the neighbouring rows moves the drive: the backlash is
 /// crossed, wind-up follows. *Guess*: the order of magnitude of friction.
 const SWINGS: f64 = 0.05;
@@ -82,29 +79,30 @@ fn carried_on([a, b, c]: [f64; AROUND_ONE]) -> f64 {
     median_of(&mut [a + 3.0 * slope, b + 2.0 * slope, c + slope])
 }
 
-/// Whether the load moves the drive for a row: it swings, and either holds no flank there or stands out itself.
-fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
-    session.torque_n_m.as_ref().is_some_and(|torque| {
-        let near = &torque[row.saturating_sub(AROUND_ONE)..(row + AROUND_ONE + 1).min(torque.len())];
-        let (low, high) = least_and_most(near.iter().copied());
-        let next = &torque[row.saturating_sub(1)..(row + 2).min(torque.len())];
-        let let_go = next.iter().any(|torque| torque.abs() < HELD * largest_n_m);
-        high - low > SWINGS * largest_n_m && (let_go || out_by(torque, row).abs() > SWINGS * largest_n_m)
-    })
-}
-
-/// Whether a torque that stands out for a row may be the drive's own. Where the load lets go of its flank next to the
-/// row, the teeth cross the clearance and strike; where the generator gains or loses speed, masses push back. The row
-/// itself does not count, as it may be the one that is wrong.
-fn may_be_felt(session: &Session, row: usize, largest_n_m: f64, fastest_rad: f64) -> bool {
-    let Some(torque) = session.torque_n_m.as_deref() else { return false };
+/// Whether the load lets go of its flank next to a row: the teeth cross the clearance and strike. The row itself does
+/// not count, as it may be the one that is wrong.
+fn strikes(torque: &[f64], row: usize, largest_n_m: f64) -> bool {
     let near = row.saturating_sub(AROUND_ONE)..(row + AROUND_ONE + 1).min(torque.len());
     let others = || near.clone().filter(|k| *k != row).map(|k| torque[k]);
     let (low, high) = least_and_most(others());
-    let strikes = high - low > SWINGS * largest_n_m && others().any(|torque| torque.abs() < HELD * largest_n_m);
-    let moves = near.clone().skip(1).map(|k| session.generator_rad[k] - session.generator_rad[k - 1]);
-    let (slow, fast) = least_and_most(moves);
-    strikes || fast - slow > GAINS * fastest_rad
+    high - low > SWINGS * largest_n_m && others().any(|torque| torque.abs() < HELD * largest_n_m)
+}
+
+/// Whether the load moves the drive for a row: it lets go of a flank, or stands out itself.
+fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
+    session
+        .torque_n_m
+        .as_ref()
+        .is_some_and(|torque| strikes(torque, row, largest_n_m) || out_by(torque, row).abs() > SWINGS * largest_n_m)
+}
+
+/// Whether a torque that stands out for a row may be the drive's own: the teeth strike, or the generator gains or loses
+/// speed, and masses push back.
+fn may_be_felt(session: &Session, row: usize, largest_n_m: f64, fastest_rad: f64) -> bool {
+    let Some(torque) = session.torque_n_m.as_deref() else { return false };
+    let near = &session.generator_rad[row.saturating_sub(AROUND_ONE)..(row + AROUND_ONE + 1).min(torque.len())];
+    let (slow, fast) = least_and_most(near.windows(2).map(|at| at[1] - at[0]));
+    strikes(torque, row, largest_n_m) || fast - slow > GAINS * fastest_rad
 }
 
 /// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.
@@ -118,24 +116,6 @@ fn out_by(values: &[f64], row: usize) -> f64 {
     };
     let (before, after) = (values[row] - middle(row - AROUND_ONE), values[row] - middle(row + 1));
     if before * after <= 0.0 { 0.0 } else { before.signum() * before.abs().min(after.abs()) }
-}
-
-/// Whether the drive goes on steadily around a row: no reversal and no load that changes at once, which give peaks of
-/// their own.
-fn steady(session: &Session, row: usize) -> bool {
-    let near = row.saturating_sub(6).max(1)..(row + 7).min(session.len());
-    let moved = |k: usize| session.generator_rad[k] - session.generator_rad[k - 1];
-    // The row itself may be the one that is out.
-    let mut others = near.clone().filter(|k| *k != row && *k != row + 1);
-    let direction = others.clone().map(moved).sum::<f64>();
-    if others.any(|k| moved(k) * direction < 0.0) {
-        return false;
-    }
-    session.torque_n_m.as_ref().is_none_or(|torque| {
-        let mut paces: Vec<f64> = near.clone().map(|k| (torque[k] - torque[k - 1]).abs()).collect();
-        let largest = paces.iter().copied().fold(0.0, f64::max);
-        largest <= LOAD_PACE * median_of(&mut paces) || largest == 0.0
-    })
 }
 
 /// A row, and by how much it is out.
@@ -201,25 +181,22 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
     let resolution = seen(sessions, gear, error_recorded).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
     let largest_n_m = largest_torque(sessions);
-    let out = sessions.iter().zip(in_sessions(sessions, least));
-    let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) = out
-        .map(|(session, out)| {
-            let steady = out.into_iter().filter(|(row, _)| steady(session, *row));
-            steady.partition(|(row, _)| load_swings(session, *row, largest_n_m))
-        })
-        .unzip();
+    let swings = |(number, found): (usize, Vec<Out>)| -> (Vec<Out>, Vec<Out>) {
+        found.into_iter().partition(|(row, _)| load_swings(&sessions[number], *row, largest_n_m))
+    };
+    let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) =
+        in_sessions(sessions, least).into_iter().enumerate().map(swings).unzip();
     let some = |found: &[Vec<Out>]| (1.0..=SHARE * rows).contains(&(count(found) as f64));
-    let mut drop: Vec<Vec<bool>> = sessions.iter().map(|session| vec![false; session.len()]).collect();
-    let mut leave_out_all = |found: &[Vec<Out>]| {
-        let of = drop.iter_mut().zip(found);
-        of.for_each(|(drop, found)| found.iter().for_each(|(row, _)| drop[*row] = true));
+    let mut drop: Vec<Vec<usize>> = vec![Vec::new(); sessions.len()];
+    let mut drop_all = |found: &[Vec<Out>]| {
+        drop.iter_mut().zip(found).for_each(|(drop, found)| drop.extend(found.iter().map(|(row, _)| *row)));
     };
     if some(&moved) {
         findings.notes.push(format!(
             "{} single rows stand out where the load swings within a row, and the drive with it; they are left out",
             count(&moved)
         ));
-        leave_out_all(&moved);
+        drop_all(&moved);
     }
     let number = count(&found);
     let mut many = false;
@@ -240,11 +217,11 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
                 .push(format!("{number} single rows stand out, always in the same position: the drive, not the data"));
         } else {
             report(sessions, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
-            leave_out_all(&found);
+            drop_all(&found);
             many = number as f64 > MANY * rows;
         }
     }
-    leave_out(sessions, &drop);
+    leave_out_rows(sessions, drop);
     if many {
         let tail = (TAIL * noise).max(STEPS * resolution);
         let rounds = (0..TAIL_ROUNDS).map(|round| if round == 0 { AROUND_ONE } else { 0 });
