@@ -10,7 +10,7 @@ use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::refusal::Refusal;
-use flexspline_base::robust::{least_and_most, quantile_of, sampled, white_noise};
+use flexspline_base::robust::{least_and_most, white_noise};
 
 /// Chance of one false alarm in a file, for a channel with noise. *Guess*: small enough for a lifetime of files.
 const CHANCE: f64 = 1e-6;
@@ -27,10 +27,6 @@ const DWELL_RAD: f64 = WIDEST_CLEARANCE_RAD;
 /// An output that dwells for longer than this, rad, has been frozen: clearance and as much of wind-up are shorter.
 /// *Guess*.
 const LONG_DWELL_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
-/// A channel without noise that is frozen catches up by this many of its usual largest steps. *Guess*: no smooth motion
-/// grows so much from row to row.
-const CATCHES_UP: f64 = 10.0;
-
 /// Stretches of rows with one value, at least `shortest` rows long.
 fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -> impl Iterator<Item = Range<usize>> {
     runs(values, same).into_iter().filter(move |run| run.len() >= shortest)
@@ -76,16 +72,22 @@ pub(in crate::measurement) fn check(
     for (number, (session, output)) in sessions.iter().zip(&outputs).enumerate() {
         let generator = &session.generator_rad;
         let mut frozen: Vec<(Quantity, Range<usize>, f64)> = Vec::new();
-        for stretch in stretches(output, 3, same) {
-            let missed = missed(generator, &stretch) / gear.ratio.abs();
-            let catches_up = output.get(stretch.end).is_some_and(|next| {
-                let due = (generator[stretch.end] - generator[stretch.start]) / gear.ratio;
-                let made = next - output[stretch.start];
-                made * due.signum() > 0.5 * due.abs() && due.abs() > 0.5 * missed
-            });
-            let by_dwell = missed > LONG_DWELL_RAD || (missed > DWELL_RAD && catches_up);
-            if by_dwell || (outputs_noisy && stretch.len() >= longest) {
-                frozen.push((follower, stretch, missed));
+        // A channel, the other one, and how far the one goes with the other.
+        let angles =
+            [(follower, output, generator, 1.0 / gear.ratio), (Quantity::Generator, generator, output, gear.ratio)];
+        for (channel, values, other, gain) in angles.into_iter().take(if error_recorded { 1 } else { 2 }) {
+            let of_output = channel != Quantity::Generator;
+            for stretch in stretches(values, 3, same) {
+                let missed = missed(other, &stretch) / if of_output { gear.ratio.abs() } else { 1.0 };
+                let catches_up = values.get(stretch.end).is_some_and(|next| {
+                    let due = (other[stretch.end] - other[stretch.start]) * gain;
+                    (next - values[stretch.start]) * due.signum() > 0.5 * due.abs()
+                });
+                let long = missed > LONG_DWELL_RAD && (of_output || !slips_a_tooth(output, &stretch, gear));
+                let dwells = missed > DWELL_RAD && missed <= LONG_DWELL_RAD && catches_up;
+                if long || dwells || (of_output && outputs_noisy && stretch.len() >= longest) {
+                    frozen.push((channel, stretch, missed));
+                }
             }
         }
         if error_recorded {
@@ -93,17 +95,6 @@ pub(in crate::measurement) fn check(
             let of_error = stretches(&session.error_rad, longest, |a, b| a == b);
             let of_error = of_error.filter(|stretch| noisy || stretch.len() == session.len());
             frozen.extend(of_error.map(|stretch| (Quantity::Error, stretch, 0.0)));
-        }
-        for stretch in stretches(generator, 3, |a, b| a == b).filter(|_| !error_recorded) {
-            let missed = missed(output, &stretch);
-            let catches_up = generator.get(stretch.end).is_some_and(|next| {
-                let due = (output[stretch.end] - output[stretch.start]) * gear.ratio;
-                (next - generator[stretch.start]) * due.signum() > 0.5 * due.abs()
-            });
-            let stands = missed > LONG_DWELL_RAD && slips_a_tooth(output, &stretch, gear);
-            if !stands && (missed > LONG_DWELL_RAD || (missed > DWELL_RAD && catches_up)) {
-                frozen.push((Quantity::Generator, stretch, missed));
-            }
         }
         for (channel, stretch, missed) in frozen {
             let fault = of_rows(sessions, FaultName::FrozenChannel, stretch.clone().map(|row| (number, row)));
@@ -149,9 +140,6 @@ fn missed(values: &[f64], stretch: &Range<usize>) -> f64 {
 const AT_LIMIT_ROWS: usize = 3;
 /// … and in this share of all rows at least. *Guess*: fewer may be left in.
 const AT_LIMIT_SHARE: f64 = 0.005;
-/// Whether a torque has noise shows in the rows between its limits, this many for each row at one. *Guess*: loads that
-/// a bench holds exactly have a few rows between them.
-const BETWEEN_LIMITS: f64 = 0.1;
 /// Noise below this share of the range of a torque is round-off. *Guess*: sensors are no better than 20 bits.
 const ROUND_OFF: f64 = 1e-6;
 
@@ -165,11 +153,8 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
     let (least, most) = least_and_most(torques.iter().copied().flatten().copied());
     let at_end = |torque: &f64| *torque == least || *torque == most;
     let between: Vec<&[f64]> =
-        torques.iter().flat_map(|torque| torque.split(at_end)).filter(|part| part.len() > 8).collect();
-    let unheld: usize = between.iter().map(|part| part.len()).sum();
-    let held: usize = torques.iter().copied().flatten().filter(|torque| at_end(torque)).count();
-    let few = (unheld as f64) < BETWEEN_LIMITS * held as f64;
-    if few || most <= least || !has_noise(&between, ROUND_OFF * (most - least)) {
+        torques.iter().flat_map(|torque| torque.split(at_end)).filter(|part| part.len() > SHORTEST).collect();
+    if most <= least || !has_noise(&between, ROUND_OFF * (most - least)) {
         return;
     }
     for limit in [least, most].into_iter().filter(|limit| *limit != 0.0) {
@@ -199,7 +184,7 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
 /// straight line, and rows whose torque nobody knows are left out, since a load swings and the drive with it.
 ///
 /// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost
-/// it, or a channel that always changes, stands, and catches up at once, is frozen.
+/// it is frozen.
 fn of_channel(
     sessions: &mut [Session],
     channel: Quantity,
@@ -212,9 +197,7 @@ fn of_channel(
         return;
     }
     let has_noise = has_noise(&series, 0.0);
-    let steps: Vec<f64> = series.iter().flat_map(|v| v.windows(2).map(|v| (v[1] - v[0]).abs())).collect();
-    let standing = steps.iter().filter(|step| **step == 0.0).count();
-    let usual = quantile_of(&mut sampled(&steps), 0.99);
+    let standing = series.iter().flat_map(|values| values.windows(2)).filter(|pair| pair[0] == pair[1]).count();
     let longest = beyond_chance(rows);
     let mut frozen: Vec<(usize, Range<usize>)> = Vec::new();
     for (number, values) in sessions.iter().enumerate().filter_map(|(k, session)| Some((k, session.column(channel)?))) {
@@ -225,10 +208,7 @@ fn of_channel(
             }
             // Without this stretch the channel stands in this many of its steps.
             let elsewhere = (standing + 1).saturating_sub(stretch.len()) as f64 / (rows - stretch.len()).max(1) as f64;
-            let noisy = has_noise && elsewhere < 0.5;
-            let back = values.get(stretch.end).map_or(0.0, |next| (next - values[stretch.start]).abs());
-            let smooth = elsewhere < 0.02 && back > CATCHES_UP * usual && usual > 0.0;
-            if noisy || smooth {
+            if has_noise && elsewhere < 0.5 {
                 frozen.push((number, stretch));
             }
         }
@@ -276,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_torque_that_saturates_is_told_once_for_each_end_and_its_rows_are_left_out() {
+    fn a_torque_that_saturates_is_named_once_for_each_end_and_its_rows_are_left_out() {
         let mut random = fastrand::Rng::with_seed(4);
         let noisy: Vec<f64> =
             (0..4000).map(|k| 40.0 * (0.01 * f64::from(k)).sin() + 0.1 * (random.f64() - 0.5)).collect();
