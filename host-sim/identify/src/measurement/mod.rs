@@ -284,8 +284,9 @@ pub(crate) fn parse_at_least(
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &columns, gear, &mut findings).map_err(refuse)?;
     let error_recorded = log.output_or_error() == Quantity::Error;
-    let drifts = faults::leaps::changes_with_the_gaps(&log, gear)
-        .is_some_and(|per_s| faults::drift::confirms(&into_sessions(log.clone(), gear.ratio), gear, per_s));
+    // A drift over long gaps looks like other zeros.
+    let drifts = faults::leaps::has_other_zeros(&log, gear)
+        && faults::drift::slope(&into_sessions(log.clone(), gear.ratio), gear).is_some();
     let other_zeros = if drifts { Vec::new() } else { faults::leaps::between_sessions(&mut log, gear, &mut findings) };
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);

@@ -25,9 +25,6 @@ const TOGETHER_RAD: f64 = 0.02;
 const TOGETHER: f64 = 0.3;
 /// Rows before and after, for what is usual there. *Guess*: few, so that the pace is the same.
 const AROUND: usize = 3;
-/// More leaps than this share of the rows are no leaps: something else is wrong with the column. *Guess*: a counter
-/// restarts now and then.
-const SHARE: f64 = 0.02;
 /// Rows at the end of a session and at the beginning of the next whose medians are compared. *Guess*: a median of eight
 /// is not moved by two bad rows.
 const LEVEL_ROWS: usize = 8;
@@ -55,35 +52,22 @@ fn usual(log: &Log, values: &[f64], row: usize) -> f64 {
 /// Finds rows into which the generator's angle leaps by whole turns, and takes these out.
 pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else { return };
-    let leaps: Vec<Turns> = (1..log.len())
-        .filter(|row| log.continues(*row))
-        .filter_map(|row| {
-            let turns = whole_turns(moved(generator, row) - moved(output, row) * gear.ratio)?;
-            let by_generator = (moved(generator, row) - usual(log, generator, row)).abs();
-            let by_output = ((moved(output, row) - usual(log, output, row)) * gear.ratio).abs();
-            // A generator that was frozen leaps to where it is: before a leap both go on together.
-            let before = |values: &[f64]| {
-                let rows = row.saturating_sub(AROUND).max(1)..row;
-                median_of(&mut rows.map(|k| moved(values, k)).collect::<Vec<f64>>())
-            };
-            let (psi, delta) = (before(generator), before(output) * gear.ratio);
-            let together = (psi - delta).abs() <= TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs());
-            let whole = (by_generator / TAU - turns.abs()).abs() < 2.0 * NEAR_TURNS;
-            (together && whole && by_generator > LEAPS_MORE * by_output).then_some((row, turns))
-        })
-        .collect();
-    if leaps.len() as f64 > SHARE * log.len() as f64 {
-        return;
-    }
-    let wraps = leaps.len() > 1 && leaps.iter().all(|(_, turns)| turns.abs() == leaps[0].1.abs());
+    let of_row = |row: usize| {
+        let turns = whole_turns(moved(generator, row) - moved(output, row) * gear.ratio)?;
+        let by_generator = (moved(generator, row) - usual(log, generator, row)).abs();
+        let by_output = ((moved(output, row) - usual(log, output, row)) * gear.ratio).abs();
+        // A generator that was frozen leaps to where it is: before a leap both go on together.
+        let before = |values: &[f64]| {
+            let rows = row.saturating_sub(AROUND).max(1)..row;
+            median_of(&mut rows.map(|k| moved(values, k)).collect::<Vec<f64>>())
+        };
+        let (psi, delta) = (before(generator), before(output) * gear.ratio);
+        let together = (psi - delta).abs() <= TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs());
+        (together && by_generator > LEAPS_MORE * by_output).then_some((row, turns))
+    };
+    let leaps: Vec<Turns> = (1..log.len()).filter(|row| log.continues(*row)).filter_map(of_row).collect();
     let times = if leaps.len() == 1 { "once".to_owned() } else { format!("in {} rows", leaps.len()) };
     take_turns_out(log, &leaps, FaultName::PositionJump, gear, findings, |largest| {
-        if wraps {
-            let turns = largest.abs();
-            return format!(
-                "the generator's count begins anew after {turns:.0} turns, {times}: it was made continuous"
-            );
-        }
         format!(
             "the generator's angle leaps by whole turns ({largest:+.0} at most), {times}, while the output goes on: \
              the turns are taken out"
@@ -204,31 +188,15 @@ pub(in crate::measurement) fn between_sessions(
     taken_off
 }
 
-/// The rate, rad/s, at which the error changes over all gaps between sessions alike, if it does: then no zero is
-/// another one, but it drifts.
-pub(in crate::measurement) fn changes_with_the_gaps(log: &Log, gear: &Gear) -> Option<f64> {
-    let (generator, output, time) =
-        (log.get(Quantity::Generator)?, log.get(Quantity::Output)?, log.get(Quantity::Time)?);
-    let sessions: Vec<Range<usize>> = log.sessions().collect();
-    if sessions.len() <= FEWEST_GAPS {
-        return None;
-    }
+/// Whether a session begins with another zero, by no whole turns of the generator.
+pub(in crate::measurement) fn has_other_zeros(log: &Log, gear: &Gear) -> bool {
+    let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else {
+        return false;
+    };
     let error: Vec<f64> = output.iter().zip(generator).map(|(output, psi)| output - psi / gear.ratio).collect();
-    let gaps: Vec<(f64, f64)> =
-        between(&sessions).map(|(row, change)| (time[row] - time[row - 1], change(&error))).collect();
-    let (square, product) = gaps.iter().fold((0.0, 0.0), |sum, gap| (sum.0 + gap.0 * gap.0, sum.1 + gap.0 * gap.1));
-    let per_s = product / square;
-    let alike = |gap: &(f64, f64)| (gap.1 - per_s * gap.0).abs() < LIKE_THE_GAP * gap.1.abs() + STATE_RAD;
-    let large = gaps.iter().any(|gap| gap.1.abs() > OTHER_ZERO_RAD);
-    (large && gaps.iter().all(alike)).then_some(per_s)
+    let sessions: Vec<Range<usize>> = log.sessions().collect();
+    between(&sessions).any(|(_, change)| change(&error).abs() > OTHER_ZERO_RAD)
 }
-
-/// Fewest gaps between sessions that have to agree. *Guess*: two may by chance.
-const FEWEST_GAPS: usize = 3;
-/// A jump over a gap is in proportion to its length within this share, … *Guess*: a drift is not quite even.
-const LIKE_THE_GAP: f64 = 0.1;
-/// … and this, by which wind-up and clearance may differ, rad. *Guess*: ten arc-minutes, a wide clearance.
-const STATE_RAD: f64 = 600.0 * ARCSEC;
 
 /// By how much the error grows with the angle within sessions, where that is beyond what a drive does; else 0.
 fn slope(generator: &[f64], error: &[f64], sessions: &[Range<usize>]) -> f64 {
