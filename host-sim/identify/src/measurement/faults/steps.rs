@@ -6,7 +6,7 @@
 //! may be set right before the next session: then its steps stay until their session ends.
 
 use super::state::{Extra, StateFit, StateModel};
-use super::{ARCSEC, Findings, of_rows, whole_pitches};
+use super::{ARCSEC, Findings, level, of_rows, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, ToothStep, Treatment};
@@ -62,6 +62,9 @@ const LOAD_PACE: f64 = 6.0;
 /// A step is separated from what it might be instead if it leaves less than this share of its misfit. *Guess*: with
 /// some thousand rows one per cent would do, were they independent.
 const CLEARLY_LESS: f64 = 0.95;
+/// Medians of six rows before and after differ by no more than this many standard deviations of the white noise.
+/// *Chosen* (4 before) as [`TAKEN_BACK`].
+const LOCAL_NOISE: f64 = 2.2;
 /// A jump stands alone: this many rows before and after it change the error by less than half as much. *Guess*: longer
 /// than a traverse of the clearance.
 const APART: usize = 12;
@@ -314,6 +317,15 @@ impl<'a> Seen<'a> {
         let session = &self.sessions[place.session];
         let loaded = || load_changes(session, place.row, self.largest) && !whole_pitches(size, self.gear, WHOLE_PITCH);
         if !is_sudden || loaded() || others_change_as_much(session, place.row, size) {
+            return 0.0;
+        }
+        // Seen close by, so that a slow change is no step: medians of a few rows.
+        let few = 6.min(place.row).min(session.len() - place.row);
+        let near = &session.error_rad[place.row - few..place.row + few];
+        let local = level(near, few..2 * few) - level(near, 0..few);
+        let mut paces: Vec<f64> = near.windows(2).map(|error| (error[1] - error[0]).abs()).collect();
+        let moves = few as f64 * median_of(&mut paces);
+        if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * self.noise + moves {
             return 0.0;
         }
         size.abs() / (LASTS * std).max(1e-300)
