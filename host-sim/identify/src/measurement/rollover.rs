@@ -48,6 +48,10 @@ const EXCHANGED: f64 = 0.75;
 /// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined
 /// without a time between them, it does not. *Guess*: half of what leaves the turn open.
 const GOES_ON: f64 = 0.25;
+/// Teeth do not skip by more than this number of motor turns in a row. *Guess*: two pitches are one turn, so that these
+/// are seven pitches.
+const MOST_SKIPPED: f64 = 3.5;
+
 /// How a column begins anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Anew {
@@ -325,9 +329,10 @@ fn along(values: &mut [f64], log: &Log, ratio: f64, output: Option<&[f64]>) -> b
     for row in 1..values.len() {
         let plain = nearest(values[row] - values[row - 1]);
         let expected = output.map_or(plain, |output| (output[row] - output[row - 1]) * ratio);
+        let far = (expected - plain).abs() > MOST_SKIPPED * TAU;
         let step = match output {
             // What goes on as it did needs no help: there it is the output that may skip, by some teeth.
-            Some(_) if fast || !log.continues(row) || (plain - last).abs() > GOES_ON * TAU => {
+            Some(_) if fast || far || !log.continues(row) || (plain - last).abs() > GOES_ON * TAU => {
                 expected + nearest(values[row] - values[row - 1] - expected)
             }
             _ => plain,
