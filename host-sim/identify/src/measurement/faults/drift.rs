@@ -26,6 +26,9 @@ const STRETCHES: usize = 24;
 const FEWEST_STRETCHES: usize = 8;
 /// Fewest rows of a stretch. *Guess*: enough for a median.
 const STRETCH_ROWS: usize = 8;
+/// Fewest gaps between sessions that separate a drift from offsets that are set anew. *Guess*: two gaps agree to a
+/// twentieth by chance in one recording of twenty.
+const FEWEST_GAPS: usize = 2;
 /// A session may lie off the line by this share of all the drift. *Guess*: that twentieth.
 const OFF_THE_LINE: f64 = 0.05;
 /// Within sessions the offset moves as it does over all of them: the slope there is off by this share at most, …
@@ -44,6 +47,9 @@ const ALIKE: f64 = 0.35;
 /// A trend may be one of position, load and temperature if considering them multiplies its standard deviation by more
 /// than this. *Guess*: then they hold 15/16 of the information.
 const CONFUSED: f64 = 4.0;
+/// It is none of them from this number of standard deviations on, if the temperature does not go with time. *Guess*:
+/// ten times what separates causes.
+const BEYOND_CONFUSION: f64 = 50.0;
 /// The temperature goes with time from this correlation on… *Guess*: nearly two thirds of its variance.
 const WITH_TIME: f64 = 0.8;
 /// …if it spans this much, K. *Guess*: within it a bench is at one temperature.
@@ -133,8 +139,9 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
         return None;
     }
     // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then it must
-    // not warm with time.
-    if formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std && warms_with_time(sessions, &tau) {
+    // not warm with time, and the sessions have to say it with one voice.
+    let confused = formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std;
+    if confused && (warms_with_time(sessions, &tau) || drift.abs() < BEYOND_CONFUSION * formal) {
         return None;
     }
     // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain.
@@ -144,6 +151,9 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
             left.iter().enumerate().map(|(row, left)| (tau(s, row), left + drift * tau(s, row))).collect()
         })
         .collect();
+    if confused && (lefts.len() <= FEWEST_GAPS || !on_the_line(&lefts, drift)) {
+        return None;
+    }
     // A zero that is set anew in each session may lie anywhere, also about a line; within the sessions it stands then.
     if (2..=MOST_ZEROS).contains(&lefts.len()) && !goes_on_within(&state, &all, place, drift, &lefts) {
         return None;
