@@ -313,8 +313,8 @@ fn text(truth: &Truth, out: &std::path::Path) -> String {
     }
     for effect in truth.effects.iter().chain(&truth.data_faults) {
         let _ = writeln!(text, "  {}", effect.definition.name());
-        for (parameter, value) in effect.definition.parameters.iter().zip(&effect.values) {
-            let _ = writeln!(text, "    {:<32} {:>14.6}", parameter.name, value.unwrap_or(f64::NAN));
+        for ParameterSpec { name, .. } in effect.definition.parameters {
+            let _ = writeln!(text, "    {name:<32} {:>14.6}", effect.given(*name).unwrap_or(f64::NAN));
         }
     }
     if truth.effects.is_empty() && truth.data_faults.is_empty() {

@@ -4,6 +4,7 @@
 //! a displacement along the normal of the flanks for eccentricities (over the base radius), along the pitch circle for
 //! pitch errors.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use serde::Serialize;
@@ -98,8 +99,8 @@ pub fn effects() -> Vec<Definition> {
 pub struct Effect {
     /// Its description.
     pub definition: Definition,
-    /// Value of each parameter.
-    pub values: Vec<Option<f64>>,
+    /// Values of its parameters.
+    values: BTreeMap<ParameterName, f64>,
 }
 
 impl Serialize for Effect {
@@ -107,14 +108,8 @@ impl Serialize for Effect {
         struct Values<'a>(&'a Effect);
         impl Serialize for Values<'_> {
             fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.collect_map(
-                    self.0
-                        .definition
-                        .parameters
-                        .iter()
-                        .zip(&self.0.values)
-                        .filter_map(|(parameter, value)| Some((parameter.name, (*value)?))),
-                )
+                let value = |of: &ParameterSpec| Some((of.name, self.0.given(of.name)?));
+                serializer.collect_map(self.0.definition.parameters.iter().filter_map(value))
             }
         }
         let mut map = serializer.serialize_map(Some(2))?;
@@ -215,7 +210,7 @@ pub fn parse(text: &str) -> Result<Effect, EffectError> {
 impl Effect {
     /// The effect with no parameter given.
     fn of(definition: Definition) -> Effect {
-        Effect { definition, values: vec![None; definition.parameters.len()] }
+        Effect { definition, values: BTreeMap::new() }
     }
 
     /// A cause with the values of some of its parameters, each brought into its range.
@@ -227,36 +222,30 @@ impl Effect {
         value: impl Fn(ParameterName) -> Option<f64>,
     ) -> Result<Effect, EffectError> {
         let mut effect = Effect::of(Definition::of_cause(cause));
-        for (k, parameter) in effect.definition.parameters.iter().enumerate() {
+        for parameter in effect.definition.parameters {
             let [low, high] = parameter.range;
             if let Some(value) = value(parameter.name).map(|value| value.clamp(low, high)) {
-                effect.put(k, Some(value), &format!("{value:?}"))?;
+                effect.put(parameter, Some(value), &format!("{value:?}"))?;
             }
         }
         Ok(effect)
     }
 
-    fn place(&self, name: ParameterName) -> Option<usize> {
-        self.definition.parameters.iter().position(|parameter| parameter.name == name)
-    }
-
     fn set(&mut self, key: &str, text: &str) -> Result<(), EffectError> {
         let (effect, parameters) = (self.definition.name(), self.definition.parameters);
-        let Some(place) = parameters.iter().position(|parameter| parameter.name.as_str() == key) else {
+        let Some(parameter) = parameters.iter().find(|parameter| parameter.name.as_str() == key) else {
             let allowed = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
             return Err(EffectError::Parameter { effect, found: key.to_owned(), allowed });
         };
-        let parameter = &parameters[place];
-        if self.values[place].is_some() {
+        if self.given(parameter.name).is_some() {
             return Err(EffectError::Twice { effect, parameter: parameter.name });
         }
         let word = parameter.words.iter().position(|word| *word == text).map(|k| k as f64);
-        self.put(place, word.or_else(|| text.parse().ok()), text)
+        self.put(parameter, word.or_else(|| text.parse().ok()), text)
     }
 
     /// Sets a parameter to what was `found`, if that is allowed.
-    fn put(&mut self, place: usize, value: Option<f64>, found: &str) -> Result<(), EffectError> {
-        let parameter = &self.definition.parameters[place];
+    fn put(&mut self, parameter: &ParameterSpec, value: Option<f64>, found: &str) -> Result<(), EffectError> {
         let [low, high] = parameter.range;
         let whole = !parameter.words.is_empty() || [Name::Harmonic, Name::Tooth].contains(&parameter.name);
         let allowed = |value: &f64| *value >= low && *value <= high && (!whole || value.fract() == 0.0);
@@ -266,14 +255,14 @@ impl Effect {
             found: found.to_owned(),
             allowed: parameter.allowed(),
         };
-        self.values[place] = Some(value.filter(allowed).ok_or_else(refuse)?);
+        self.values.insert(parameter.name, value.filter(allowed).ok_or_else(refuse)?);
         Ok(())
     }
 
     /// The value of a parameter, if it has one.
     #[must_use]
     pub fn given(&self, name: ParameterName) -> Option<f64> {
-        self.values[self.place(name)?]
+        self.values.get(&name).copied()
     }
 
     /// The value of a parameter of a completed effect.
@@ -285,33 +274,30 @@ impl Effect {
     pub(super) fn completed(&self, setting: &Setting<'_>, random: &mut fastrand::Rng) -> Result<Effect, EffectError> {
         let mut complete = self.clone();
         let Definition { parameters, twins, .. } = self.definition;
-        for (k, parameter) in parameters.iter().enumerate() {
+        for parameter in parameters {
             let drawn = if CAME_LATER.contains(&parameter.name) { 0.0 } else { random.f64() };
             // Which of two forms was given decides; the other follows below.
             let is_first_of_given = twins.iter().any(|(a, b, _)| *a == parameter.name && self.given(*b).is_some());
-            if complete.values[k].is_some() || is_first_of_given {
+            if self.given(parameter.name).is_some() || is_first_of_given {
                 continue;
             }
-            complete.values[k] = match parameter.usual {
-                Usual::Value(value) => Some(value),
-                Usual::OfLoad(share) => Some(share * setting.load_n_m),
-                Usual::Drawn(low, high) => Some(low + (high - low) * drawn),
-                Usual::Instant(low, high) => Some(setting.instant(low + (high - low) * drawn)),
-                Usual::ToothPitch => Some(setting.tooth_pitch_arcsec()?),
-                Usual::Follows => None,
+            let value = match parameter.usual {
+                Usual::Value(value) => value,
+                Usual::OfLoad(share) => share * setting.load_n_m,
+                Usual::Drawn(low, high) => low + (high - low) * drawn,
+                Usual::Instant(low, high) => setting.instant(low + (high - low) * drawn),
+                Usual::ToothPitch => setting.tooth_pitch_arcsec()?,
+                Usual::Follows => continue,
             };
+            complete.values.insert(parameter.name, value);
         }
         for (a, b, factor) in twins {
             let factor = setting.factor(*factor, &complete)?;
-            let (first, second) = (complete.given(*a), complete.given(*b));
-            let follows = match (first, second) {
-                (Some(first), None) => complete.place(*b).map(|at| (at, first * factor)),
-                (None, Some(second)) => complete.place(*a).map(|at| (at, second / factor)),
+            match (complete.given(*a), complete.given(*b)) {
+                (Some(first), None) => complete.values.insert(*b, first * factor),
+                (None, Some(second)) => complete.values.insert(*a, second / factor),
                 _ => None,
             };
-            if let Some((at, value)) = follows {
-                complete.values[at] = Some(value);
-            }
         }
         let refuse = |parameter, found: f64, allowed| {
             Err(EffectError::Value { effect: self.definition.name(), parameter, found: found.to_string(), allowed })
