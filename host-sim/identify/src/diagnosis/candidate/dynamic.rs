@@ -292,9 +292,6 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
 /// Models of an unbalanced load: the load that gravity adds moves the torque at which the play turns over, so that the
 /// law which the play follows there shows only now.
 fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
-    if !on.speaks_of(CauseName::GravityTorque) {
-        return Vec::new();
-    }
     let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
     if !plays.contains(&on.base.law) {
         plays.push(on.base.law);

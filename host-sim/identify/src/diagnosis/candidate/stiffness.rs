@@ -422,10 +422,7 @@ pub(crate) const TORSIONAL_HYSTERESIS: CauseSpec = CauseSpec {
         number(Name::HalfWidthArcsec, "half the opening of the large loop at zero torque", 0.0, 1000.0, Value(15.0)),
         number(Name::SlipTorqueNM, "at which the middle spring slips", 1e-3, 1e6, OfLoad(0.2)),
     ],
-    laws: |on| {
-        let spoken_of = on.speaks_of(CauseName::TorsionalHysteresis);
-        spoken_of.then(|| torsional_hysteresis(on)).into_iter().collect()
-    },
+    laws: |on| vec![torsional_hysteresis(on)],
     simulated: |on, p| {
         let slip = p(Name::SlipTorqueNM);
         let held = held(on.scales.load, slip);
