@@ -11,6 +11,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use flexspline::Table;
+use serde::{Deserialize, Serialize};
 
 use super::flank_lag::{behind, flank_lag};
 use super::rows::Rows;
@@ -20,7 +21,8 @@ use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// How the flank changes where the torque is below friction.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub(crate) enum PlayLaw {
     /// It stays as it was until the torque exceeds friction.
     Held,

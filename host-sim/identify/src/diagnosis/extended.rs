@@ -7,11 +7,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use flexspline::Table;
+use serde::{Deserialize, Serialize};
 
 use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
 use super::candidate::{Acting, Excitation, Law, LawUnits, Tag, library, together};
 use super::model::{Problem, Scaffold, terms_at};
+use super::prepare::Jump;
 use super::report::Parameter;
 use super::resolution::averages_hide;
 use super::rows::{Rows, add_scaled, combined};
@@ -48,21 +50,29 @@ impl FittedCause {
 }
 
 /// The model of a cause as it was fitted, to be evaluated on other recordings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FittedLaw {
+    /// A hash of the parameters that it belongs to.
+    pub(crate) of: String,
     /// Which of the models of its cause it is.
-    pub(crate) variant: String,
-    /// Values of its shape parameters.
-    pub(crate) shape: Vec<f64>,
-    /// Coefficients of its columns.
-    pub(crate) coefficients: Vec<f64>,
-    /// What the coefficients are counted in.
-    pub(crate) scales: LawUnits,
+    variant: String,
     /// How the flank was found to change below friction.
-    pub(crate) play: PlayLaw,
-    /// Stiffness at the least torque, N·m/rad, and backlash, arcsec, of the nominal model that it was fitted beside:
-    /// those of the file are recalibrated.
-    pub(crate) beside: [f64; 2],
+    play: PlayLaw,
+    /// Stiffness at the least torque of the nominal model that it was fitted with, N·m/rad: that of the file is
+    /// recalibrated.
+    stiffness_n_m_per_rad: f64,
+    /// Backlash of that nominal model, arcsec.
+    backlash_arcsec: f64,
+    /// Values of its shape parameters.
+    shape: Vec<f64>,
+    /// Coefficients of its columns.
+    coefficients: Vec<f64>,
+    /// Jumps of the error in its data: when one begins, has half its height, and is over, s; its height, arcsec.
+    #[serde(default)]
+    jumps: Vec<[f64; 4]>,
+    /// Units of the coefficients, without the jumps.
+    scales: LawUnits,
 }
 
 /// What causes as they were fitted add to the error of each session, arcsec, in the order of the causes; nothing where
@@ -74,13 +84,16 @@ pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nomina
     let rows = Rows::new(sessions, nominal);
     let mut added = vec![0.0; rows.len()];
     let of_one_fit = |(_, a): &(CauseName, &FittedLaw), (_, b): &(CauseName, &FittedLaw)| {
-        a.scales == b.scales && a.play == b.play && a.beside == b.beside
+        let nominal = |fit: &FittedLaw| (fit.play, fit.stiffness_n_m_per_rad, fit.backlash_arcsec);
+        a.scales == b.scales && a.jumps == b.jumps && nominal(a) == nominal(b)
     };
     for causes in fitted.chunk_by(of_one_fit) {
         let (_, first) = causes.first()?;
         let nominal = first.nominal(nominal);
         let base = Base::with_play(&rows, &nominal, None, first.play);
-        let on = Excitation::new(&rows, &nominal, &base, &first.scales);
+        let jump = |&[begin, half, over, height_arcsec]: &[f64; 4]| Jump { time_s: [begin, half, over], height_arcsec };
+        let scales = LawUnits { jumps: first.jumps.iter().map(jump).collect(), ..first.scales.clone() };
+        let on = Excitation::new(&rows, &nominal, &base, &scales);
         let laws: Vec<Law> = causes.iter().flat_map(|(name, _)| (name.spec().laws)(&on)).collect();
         let acting = causes.iter().map(|(name, fit)| fit.acting(*name, &on, &laws)).collect::<Option<Vec<_>>>()?;
         for (cause, columns) in acting.iter().zip(together(&on, &acting)) {
@@ -103,11 +116,10 @@ pub(crate) fn nominal_arcsec(
 }
 
 impl FittedLaw {
-    /// The nominal model that it was fitted beside, made of the recalibrated one.
+    /// The nominal model that it was fitted with, made of the recalibrated one.
     fn nominal(&self, recalibrated: &Nominal) -> Nominal {
-        let [stiffness, backlash_arcsec] = self.beside;
-        let mut nominal = Nominal { backlash_arcsec, ..recalibrated.clone() };
-        let factor = nominal.stiffness.first().map_or(1.0, |[_, now]| stiffness / now);
+        let mut nominal = Nominal { backlash_arcsec: self.backlash_arcsec, ..recalibrated.clone() };
+        let factor = nominal.stiffness.first().map_or(1.0, |[_, now]| self.stiffness_n_m_per_rad / now);
         nominal.stiffness.iter_mut().for_each(|[_, k]| *k *= factor);
         nominal
     }
@@ -238,18 +250,22 @@ impl Extended {
         &self.causes
     }
 
-    /// The model of the cause at `at` in [`Extended::causes`], fitted beside `nominal`, to be evaluated on other
-    /// recordings.
+    /// The model of a cause, fitted with `nominal`, to be evaluated on other recordings; `of` is the hash of its
+    /// parameters.
     #[must_use]
-    pub(crate) fn fitted_law(&self, at: usize, nominal: &Nominal) -> Option<FittedLaw> {
-        let cause = self.causes.get(at)?;
+    pub(crate) fn fitted_law(&self, name: CauseName, nominal: &Nominal, of: String) -> Option<FittedLaw> {
+        let cause = self.causes.iter().find(|cause| cause.name == name)?;
+        let jump = |Jump { time_s: [begin, half, over], height_arcsec }: &Jump| [*begin, *half, *over, *height_arcsec];
         Some(FittedLaw {
+            of,
             variant: cause.law.variant.to_string(),
             shape: cause.law.values(&cause.places),
             coefficients: cause.coefficients.clone(),
-            scales: self.scales.clone(),
+            jumps: self.scales.jumps.iter().map(jump).collect(),
+            scales: LawUnits { jumps: Vec::new(), ..self.scales.clone() },
             play: self.play,
-            beside: [nominal.stiffness.first().map_or(0.0, |[_, k]| *k), nominal.backlash_arcsec],
+            stiffness_n_m_per_rad: nominal.stiffness.first().map_or(0.0, |[_, k]| *k),
+            backlash_arcsec: nominal.backlash_arcsec,
         })
     }
 

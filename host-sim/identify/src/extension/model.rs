@@ -18,19 +18,17 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use flexspline::FixedMember;
+use serde::Deserialize;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER, ParameterName as Name};
-use crate::diagnosis::base::PlayLaw;
-use crate::diagnosis::candidate::LawUnits;
-use crate::diagnosis::prepare::Jump;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
 use crate::diagnosis::{Extended, FittedLaw, added_by};
 use crate::measurement::Session;
 use crate::nominal::{Harmonic, Nominal, Teeth};
 use crate::synthesize::{Effect, EffectError, Sizes, added_arcsec, completed};
-use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, each_of, entries_of, one_of, text as text_of};
+use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, entries_of, one_of};
 use flexspline_mechanics::drive::{DriveError, Problem};
 
 /// A cause with the values of its parameters.
@@ -205,7 +203,7 @@ fn causes_of(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Vec<CauseEntry> {
         let cause = Entries::of(entry, &["name", "parameters", "fit"])?;
         let name = cause.needed("name", |v| one_of(&known, v))?;
         let parameters: BTreeMap<String, f64> = cause.given("parameters", |v| entries_of(v, any))?.unwrap_or_default();
-        let fit = cause.given("fit", fit_of)?.filter(|(of, _)| *of == fingerprint(&parameters)).map(|(_, fit)| fit);
+        let fit = cause.given("fit", fit_of)?.filter(|fit| fit.of == fingerprint(&parameters));
         let cause = CauseEntry { name, parameters, fit };
         cause.checked_effect().map_err(|error| Refused::because(entry, error.to_string()))?;
         Ok(cause)
@@ -222,7 +220,10 @@ pub fn causes_to_toml(causes: &[CauseEntry]) -> String {
             let _ = writeln!(text, "{name} = {value:?}");
         }
         if let Some(fit) = &cause.fit {
-            write_fit(&mut text, fit, &cause.parameters);
+            let fit = toml::to_string(fit).expect("names and numbers");
+            text += "# The model of this cause as it was fitted. It counts as long as the parameters above are not \
+                     changed.\n[extension.cause.fit]\n";
+            text += &fit.replace("[scales]", "[extension.cause.fit.scales]");
         }
     }
     text
@@ -238,76 +239,10 @@ fn fingerprint(parameters: &BTreeMap<String, f64>) -> String {
     hash.finalize().to_hex()[..16].to_owned()
 }
 
-/// A number of [`LawUnits`] and its name in a file.
-type ScaleField = (&'static str, fn(&mut LawUnits) -> &mut f64);
-
-const SCALES: [ScaleField; 6] = [
-    ("load_n_m", |s| &mut s.load),
-    ("mean_speed_rad_s", |s| &mut s.mean_speed),
-    ("begin_s", |s| &mut s.begin_s),
-    ("duration_s", |s| &mut s.duration_s),
-    ("travel_rad", |s| &mut s.travel),
-    ("arcsec_per_um", |s| &mut s.arcsec_per_um),
-];
-
-fn write_fit(text: &mut String, fit: &FittedLaw, parameters: &BTreeMap<String, f64>) {
-    let mut units = fit.scales.clone();
-    let counted_in = SCALES.map(|(name, of)| format!("{name} = {:?}", of(&mut units))).join(", ");
-    let jump = |jump: &Jump| {
-        let [begin, half, over] = jump.time_s;
-        format!("{:?}", [begin, half, over, jump.height_arcsec])
-    };
-    let jumps = fit.scales.jumps.iter().map(jump).collect::<Vec<String>>().join(", ");
-    text.push_str(
-        "# The model of this cause as it was fitted. It counts as long as the parameters above are not changed.\n\
-         [extension.cause.fit]\n",
-    );
-    let values = [
-        format!("{:?}", fingerprint(parameters)),
-        format!("{:?}", fit.variant),
-        format!("{:?}", fit.play.as_str()),
-        format!("{:?}", fit.beside[0]),
-        format!("{:?}", fit.beside[1]),
-        format!("{:?}", fit.shape),
-        format!("{:?}", fit.coefficients),
-        format!("{{ {counted_in} }}"),
-        format!("[{jumps}]"),
-    ];
-    for (name, value) in FIT.iter().zip(values) {
-        let _ = writeln!(text, "{name} = {value}");
-    }
-}
-
-/// Fields of a fit.
-const FIT: [&str; 9] =
-    ["of", "variant", "play", "stiffness_n_m_per_rad", "backlash_arcsec", "shape", "coefficients", "scales", "jumps"];
-
-/// A fit, and the fingerprint of the parameters that it belongs to.
-fn fit_of(value: &Spanned<DeValue<'_>>) -> Result<(String, FittedLaw), Refused> {
-    let fit = Entries::of(value, &FIT)?;
-    let numbers = |v: &Spanned<DeValue<'_>>| each_of(v, "[ numbers ]", any);
-    let mut scales = LawUnits::default();
-    let given = fit.needed("scales", |v| entries_of(v, any))?;
-    for (name, of) in SCALES {
-        *of(&mut scales) = *given
-            .get(name)
-            .ok_or_else(|| Refused::because(value, format!("scales.{name}: missing; give a number")))?;
-    }
-    for jump in fit.given("jumps", |v| each_of(v, "[ jumps ]", numbers))?.unwrap_or_default() {
-        let &[begin, half, over, height_arcsec] = jump.as_slice() else {
-            return Err(Refused::because(value, format!("found a jump of {} numbers, allowed: 4", jump.len())));
-        };
-        scales.jumps.push(Jump { time_s: [begin, half, over], height_arcsec });
-    }
-    let law = FittedLaw {
-        variant: fit.needed("variant", text_of)?,
-        play: fit.needed("play", |v| one_of(&PlayLaw::ALL.map(|play| (play.as_str(), play)), v))?,
-        shape: fit.needed("shape", numbers)?,
-        coefficients: fit.needed("coefficients", numbers)?,
-        beside: [fit.needed("stiffness_n_m_per_rad", any)?, fit.needed("backlash_arcsec", any)?],
-        scales,
-    };
-    Ok((fit.needed("of", text_of)?, law))
+/// A fit.
+fn fit_of(value: &Spanned<DeValue<'_>>) -> Result<FittedLaw, Refused> {
+    FittedLaw::deserialize(ValueDeserializer::from(value.clone()))
+        .map_err(|error| Refused::because(value, error.message().to_owned()))
 }
 
 /// Values of `name`, `name 4`, `name 5`, ... in the order of their numbers.
@@ -335,8 +270,7 @@ impl CauseEntry {
     /// The cause with the model that was fitted, for a nominal model.
     #[must_use]
     pub(crate) fn fitted_by(self, extended: &Extended, nominal: &Nominal) -> CauseEntry {
-        let at = extended.causes().iter().position(|cause| cause.name() == self.name);
-        CauseEntry { fit: at.and_then(|at| extended.fitted_law(at, nominal)), ..self }
+        CauseEntry { fit: extended.fitted_law(self.name, nominal, fingerprint(&self.parameters)), ..self }
     }
 
     /// The effect that simulates it, if there is one.
@@ -390,6 +324,36 @@ mod tests {
         assert_eq!(effects.len(), 2);
         assert_eq!(effects[0].given(Name::DelayS), Some(0.0021));
         assert_eq!((effects[1].given(Name::AmplitudeArcsec), effects[1].given(Name::AmplitudeUm)), (Some(31.0), None));
+    }
+
+    #[test]
+    fn a_fit_in_one_line_or_in_tables_is_the_same_and_belongs_to_its_parameters() {
+        let mut model = model();
+        model.causes.truncate(1);
+        let fit = format!(
+            "[extension.cause.fit]\nof = {:?}\nvariant = \"\"\nplay = \"pushed\"\nstiffness_n_m_per_rad = \
+             30000\nbacklash_arcsec = 60.0\nshape = []\ncoefficients = [0.0021, -1e-9]\nscales = {{ load_n_m = 12.5, \
+             mean_speed_rad_s = 3.0, begin_s = 0.0, duration_s = 9.0, travel_rad = 40.0, arcsec_per_um = 4.2 }}\njumps \
+             = [[1.0, 1.5, 2.0, 6800.0]]\n",
+            fingerprint(&model.causes[0].parameters)
+        );
+        let text = model.to_toml() + &fit;
+        let read = |text: &str| Model::from_toml("d.toml", text);
+        let known = read(&text).unwrap();
+        assert!(known.causes[0].fit.is_some());
+        assert_eq!(read(&known.to_toml()), Ok(known));
+        assert!(read(&text.replace("0.0021\n", "0.003\n")).unwrap().causes[0].fit.is_none());
+        for (from, to, message) in [
+            ("begin_s = 0.0, ", "", "extension.cause[0].fit: missing field `begin_s`"),
+            (
+                "\"pushed\"",
+                "\"pulled\"",
+                "unknown variant `pulled`, expected one of `held`, `pushed`, `sign`, `smooth`",
+            ),
+        ] {
+            let error = read(&text.replace(from, to)).unwrap_err().to_string();
+            assert!(error.contains(message), "{error}");
+        }
     }
 
     #[test]

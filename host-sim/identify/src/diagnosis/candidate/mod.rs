@@ -25,6 +25,8 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use serde::{Deserialize, Serialize};
+
 use super::base::Base;
 use super::prepare::{Jump, whole_pitches};
 use super::rows::Rows;
@@ -182,21 +184,25 @@ impl<'a> Excitation<'a> {
 
 /// Units of the coefficients of laws: taken from the rows that a model is fitted to, kept where it predicts
 /// others.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LawUnits {
     /// Scale of the load, N·m; 0 without torque.
+    #[serde(rename = "load_n_m")]
     pub load: f64,
     /// Mean speed of the generator while it moves, rad/s.
+    #[serde(rename = "mean_speed_rad_s")]
     pub mean_speed: f64,
     /// Time of the first row, s.
     pub begin_s: f64,
     /// From the first row to the last, s.
     pub duration_s: f64,
     /// Travel of the generator from the first row to the last, rad.
+    #[serde(rename = "travel_rad")]
     pub travel: f64,
     /// Arcsec at the output for 1 µm on the pitch circle.
     pub arcsec_per_um: f64,
     /// Jumps found in the data.
+    #[serde(skip)]
     pub jumps: Vec<Jump>,
 }
 
