@@ -69,6 +69,7 @@ pub use pipeline::{
 };
 use prepare::FreeColumns;
 pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
+use remainder::SpectralLine;
 use resolution::hidden_by_averages;
 use rows::Rows;
 use select::{Bests, Chooser, Scope, Selected};
@@ -125,9 +126,6 @@ impl Default for Settings<'_> {
 
 /// Rows needed at least. *Guess*: several for each of some dozen columns.
 pub(crate) const LEAST_ROWS: usize = 200;
-/// Orders per generator turn up to which lines are looked for. *Guess*: above what bearings make, below the tooth mesh
-/// of ratios above 75, which has models of its own.
-const HIGHEST_ORDER: f64 = 150.0;
 /// Times that causes are chosen again, at most.
 const MOST_ROUNDS: usize = 2;
 /// Diagnoses sessions against a nominal model, or against a table of the FEM that takes its place in the prediction.
@@ -265,14 +263,14 @@ impl<'a> Search<'a> {
             if round == MOST_ROUNDS {
                 break;
             }
-            let lines = lines_left(&problem, &selected, noise);
-            let (slow, found): (Vec<_>, Vec<_>) =
-                lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
-            for (line, size) in found {
+            let (hidden, slow): (Vec<SpectralLine>, Vec<SpectralLine>) = remainder::lines(&problem, &selected, noise)
+                .into_iter()
+                .partition(|line| remainder::averaged_away(&problem, line));
+            for line in hidden {
                 let label = Label::Line { per: line.per, order: line.order };
                 if fast.iter().all(|(known, _)| known.to_string() != label.to_string()) {
-                    trace.say(&format_args!("{label}: {size:.2} arcsec, too fast for averages"));
-                    fast.push((label, size));
+                    trace.say(&format_args!("{label}: {:.2} arcsec, too fast for averages", line.size_arcsec));
+                    fast.push((label, line.size_arcsec));
                 }
             }
             let mut explained = remainder::explained(&problem, &selected);
@@ -285,10 +283,10 @@ impl<'a> Search<'a> {
                 doubtful.iter().zip(&uncertain).zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
             drop(selected);
             let known = laws.len();
-            for (found, size) in slow {
+            for found in slow {
                 let law = line(found.per, found.order);
                 if laws.iter().all(|l| l.label != law.label) {
-                    trace.say(&format_args!("{}: {size:.2} arcsec", law.label));
+                    trace.say(&format_args!("{}: {:.2} arcsec", law.label, found.size_arcsec));
                     laws.push(law);
                 }
             }
@@ -356,24 +354,5 @@ fn remembered(laws: &[Law], terms: &[Term<'_>]) -> Places {
     terms
         .iter()
         .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
-        .collect()
-}
-
-/// Lines in every row, as averages would hide the fast ones, with their size in arcsec.
-fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<(remainder::SpectralLine, f64)> {
-    let every = remainder::every_row(problem, selected, noise);
-    let rows = every.len();
-    remainder::lines(problem, &every, HIGHEST_ORDER.min(problem.on.rows.highest_order()))
-        .into_iter()
-        .filter(|line| line.power > remainder::line_limit(rows))
-        .map(|line| {
-            let fast = remainder::averaged_away(problem, &line);
-            let line = if fast { remainder::at_its_places(problem.on.rows, &every, &line) } else { line };
-            // In innovations of variance v a line of amplitude a has the power n a² / 4 v.
-            let size = noise.white * rows::rms(&every) * (2.0 * line.power / rows as f64).sqrt();
-            (line, size)
-        })
-        // Rounding of a steady motion makes lines, of no more than all of it.
-        .filter(|(_, size)| *size > (0.25 * select::least_size(noise.white)).max(problem.on.rows.rounding))
         .collect()
 }

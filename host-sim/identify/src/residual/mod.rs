@@ -12,6 +12,7 @@ mod spectrum;
 
 pub use orders::{Line, NamedOrder, harmonics, named_orders};
 pub use rows::{Axis, SizeMismatch};
+pub(crate) use spectrum::strongest;
 pub use spectrum::{OrderSpectrum, Peak, order_spectrum};
 
 use serde::Serialize;

@@ -96,10 +96,7 @@ pub fn order_spectrum(axis: Axis, angle: &[f64], value: &[f64], ratio: f64) -> O
         sampled(&angle.windows(2).map(|x| (x[1] - x[0]).abs()).filter(|step| *step > 0.0).collect::<Vec<_>>());
     let mut highest = HIGHEST_ORDER.min(sampled_twice(&mut steps, 0.75));
     let resolution = 1.0 / turns.max(1e-300);
-    let transform = |highest: f64| OVERSAMPLING * turns * highest * CELLS_PER_WAVE;
-    if transform(highest) > LARGEST as f64 {
-        highest *= LARGEST as f64 / transform(highest);
-    }
+    highest = highest.min(highest_within(turns));
     if angle.len() < 16 || !turns.is_finite() || highest < 2.0 * resolution {
         let resolution = if turns > 0.0 { resolution } else { 0.0 };
         return OrderSpectrum { axis, turns, resolution, ..OrderSpectrum::default() };
@@ -185,6 +182,27 @@ pub fn order_spectrum(axis: Axis, angle: &[f64], value: &[f64], ratio: f64) -> O
     }
 }
 
+/// Highest order along this number of turns that the largest transform holds.
+fn highest_within(turns: f64) -> f64 {
+    LARGEST as f64 / (OVERSAMPLING * turns * CELLS_PER_WAVE)
+}
+
+/// The strongest line of `value` along `angle` (rad), from the order `lowest` to `highest`: its order, and its power in
+/// units of what white noise has on average.
+pub(crate) fn strongest(angle: &[f64], value: &[f64], lowest: f64, highest: f64) -> Option<(f64, f64)> {
+    let (low, high) = least_and_most(angle.iter().copied());
+    let turns = (high - low) / TAU;
+    let (lowest, highest) = (lowest.max(1.0 / turns), highest.min(highest_within(turns)));
+    if !(turns > 0.0 && highest > lowest) {
+        return None;
+    }
+    let grid = Grid::new(angle, low, turns, highest, lowest);
+    let (orders, scan) = (grid.orders(), grid.scan(value));
+    let best = (0..scan.len()).max_by(|a, b| scan[*a].total_cmp(&scan[*b]))?;
+    let (rows, total) = (value.len() as f64, value.iter().map(|v| v * v).sum::<f64>());
+    Some((summit(&orders, &scan, best), 0.25 * rows * rows * scan[best] / total.max(1e-30)))
+}
+
 /// Rows shared out on a grid, and what of the spectrum depends on the angles alone.
 struct Grid<'a> {
     angle: &'a [f64],
@@ -200,12 +218,13 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(angle: &'a [f64], low: f64, turns: f64, highest: f64, resolution: f64) -> Grid<'a> {
+    /// Of orders from `lowest` to `highest`; the angle turns from `low` by `turns`.
+    fn new(angle: &'a [f64], low: f64, turns: f64, highest: f64, lowest: f64) -> Grid<'a> {
         let per_turn = highest * CELLS_PER_WAVE;
         let length =
             ((OVERSAMPLING * turns * per_turn).max(turns * per_turn + 2.0) as usize).next_power_of_two().max(64);
         let place = |order: f64| order * length as f64 / per_turn;
-        let places = place(resolution).ceil() as usize..=(place(highest) as usize).min(length / 2 - 1);
+        let places = place(lowest).ceil() as usize..=(place(highest) as usize).min(length / 2 - 1);
         let mut grid = Grid { angle, low, per_turn, length, places, window: Vec::new() };
         grid.window = grid.transform(|_| 1.0);
         grid
