@@ -33,7 +33,7 @@ pub(crate) fn hidden_by_averages(
         return None;
     }
     let left = on.left(explained);
-    let averages = averages_of(on, uncertain, stride);
+    let averages = Whitener::plain(on.rows, uncertain, stride, 1.0);
     laws.iter()
         .filter(|law| law.named() && law.shapes.is_empty())
         .filter_map(|law| hidden(on, law, &averages))
@@ -49,25 +49,16 @@ pub(crate) fn averages_hide(
     uncertain: &[bool],
     stride: usize,
 ) -> bool {
-    let averages = averages_of(on, uncertain, stride);
-    let asked =
-        laws.iter().filter(|law| law.shapes.is_empty() && law.cause().is_some_and(|cause| causes.contains(&cause)));
-    asked.into_iter().any(|law| hidden(on, law, &averages).is_some())
-}
-
-fn averages_of(on: &Excitation<'_>, uncertain: &[bool], stride: usize) -> Whitener {
-    Whitener::plain(on.rows, uncertain, stride, 1.0)
+    let averages = Whitener::plain(on.rows, uncertain, stride, 1.0);
+    let asked = |law: &&Law| law.shapes.is_empty() && law.cause().is_some_and(|cause| causes.contains(&cause));
+    laws.iter().filter(asked).any(|law| hidden(on, law, &averages).is_some())
 }
 
 /// The main columns of a law, if averages hide all of them.
 fn hidden(on: &Excitation<'_>, law: &Law, averages: &Whitener) -> Option<Vec<Vec<f64>>> {
-    let main = main_columns(on, law);
+    let columns = law.columns(on, &[]).into_iter();
+    let main: Vec<Vec<f64>> = columns.filter(|c| matches!(c.tolerance, Tolerance::Main(_))).map(|c| c.values).collect();
     (!main.is_empty() && main.iter().all(|column| averages.hides(column))).then_some(main)
-}
-
-fn main_columns(on: &Excitation<'_>, law: &Law) -> Vec<Vec<f64>> {
-    let columns = law.columns(on, &[]);
-    columns.into_iter().filter(|c| matches!(c.tolerance, Tolerance::Main(_))).map(|c| c.values).collect()
 }
 
 /// What is left of each row less the mean of the rows around it: nothing of a straight line.
@@ -84,31 +75,22 @@ fn detail(rows: &Rows, column: &[f64]) -> Vec<f64> {
 
 /// The columns fitted to the detail of the data, as what they explain in the rows; nothing where the evidence is short.
 fn explained_in_detail(rows: &Rows, columns: &[Vec<f64>], left: &[f64], uncertain: &[bool]) -> Option<Vec<f64>> {
-    let mut data = detail(rows, left);
+    let data = detail(rows, left);
     let usable =
         |k: usize| !uncertain[k.saturating_sub(TOGETHER / 2)..(k + TOGETHER / 2 + 1).min(left.len())].contains(&true);
     let spread = robust_std((0..data.len()).filter(|k| usable(*k)).map(|k| data[k]));
-    let mut used = 0usize;
-    for (k, value) in data.iter_mut().enumerate() {
-        if usable(k) && value.abs() < OUTLIER * spread {
-            used += 1;
-        } else {
-            *value = f64::NAN;
-        }
-    }
-    let details: Vec<Vec<f64>> = columns
-        .iter()
-        .map(|column| {
-            let fine = detail(rows, column);
-            fine.iter().zip(&data).map(|(c, d)| if d.is_nan() { 0.0 } else { *c }).collect()
-        })
-        .collect();
+    let counts: Vec<bool> = (0..data.len()).map(|k| usable(k) && data[k].abs() < OUTLIER * spread).collect();
+    let used = counts.iter().filter(|counts| **counts).count();
+    let counted = |detail: Vec<f64>| -> Vec<f64> {
+        detail.into_iter().zip(&counts).map(|(value, counts)| if *counts { value } else { 0.0 }).collect()
+    };
+    let details: Vec<Vec<f64>> = columns.iter().map(|column| counted(detail(rows, column))).collect();
     if details.iter().zip(columns).any(|(fine, column)| rms(fine) < IN_DETAIL * rms(column))
         || used < 20 * columns.len()
     {
         return None;
     }
-    let data: Vec<f64> = data.iter().map(|d| if d.is_nan() { 0.0 } else { *d }).collect();
+    let data = counted(data);
     let views: Vec<&[f64]> = details.iter().chain([&data]).map(Vec::as_slice).collect();
     let gram = Gram::of(&views, 0..data.len());
     let free: Vec<Prior> = columns.iter().map(|c| Prior { mean: 0.0, std: 1e3 * spread / rms(c).max(1e-12) }).collect();
