@@ -1,8 +1,7 @@
 //! Dense matrices.
 
-use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::Side;
 use faer::linalg::solvers::{Llt, Solve};
-use faer::{Accum, Par, Side};
 
 use crate::NotPositiveDefinite;
 
@@ -23,12 +22,6 @@ pub fn cholesky(matrix: MatRef<'_>) -> Result<CholeskyFactor, NotPositiveDefinit
 }
 
 impl CholeskyFactor {
-    /// The factor itself, lower triangular.
-    #[must_use]
-    pub fn lower(&self) -> MatRef<'_> {
-        self.0.L()
-    }
-
     /// `A⁻¹ B`.
     #[must_use]
     pub fn solve(&self, right_hand_sides: MatRef<'_>) -> Mat {
@@ -47,13 +40,4 @@ impl CholeskyFactor {
 #[must_use]
 pub fn product(a: MatRef<'_>, b: MatRef<'_>) -> Mat {
     a * b
-}
-
-/// Lower triangle of `A B`, which the caller knows to be symmetric; above it, zeros.
-#[must_use]
-pub fn lower_of_product(a: MatRef<'_>, b: MatRef<'_>) -> Mat {
-    let mut lower = Mat::zeros(a.nrows(), b.ncols());
-    let (half, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    triangular::matmul(&mut lower, half, Accum::Replace, a, whole, b, whole, 1.0, Par::Seq);
-    lower
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use flexspline_algebra::{Complex, Mat, NotPositiveDefinite, cholesky, lower_of_product, product, spectrum};
+use flexspline_algebra::{Complex, Mat, NotPositiveDefinite, cholesky, product, spectrum};
 
 /// Entries that look random, and twice as many rows as columns.
 fn tall(columns: usize) -> Mat {
@@ -31,18 +31,6 @@ fn what_is_not_positive_definite_is_refused() {
     let negative = Mat::from_fn(3, 3, |i, j| if i == j { -1.0 } else { 0.0 });
     assert_eq!(cholesky(negative.as_ref()).err(), Some(NotPositiveDefinite));
     assert_eq!(cholesky(flat.as_ref()).err(), Some(NotPositiveDefinite));
-}
-
-#[test]
-fn the_lower_triangle_is_that_of_the_product() {
-    let a = tall(20);
-    let (whole, lower) = (product(a.transpose(), a.as_ref()), lower_of_product(a.transpose(), a.as_ref()));
-    for i in 0..20 {
-        for j in 0..20 {
-            let due = if j <= i { whole[(i, j)] } else { 0.0 };
-            assert!((lower[(i, j)] - due).abs() < 1e-12);
-        }
-    }
 }
 
 #[test]

@@ -6,7 +6,6 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use flexspline_algebra::{Mat, cholesky, lower_of_product};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::least_squares::dot;
@@ -67,28 +66,12 @@ impl Gram {
     #[must_use]
     pub fn of(columns: &[&[f64]], range: Range<usize>) -> Gram {
         let size = columns.len();
-        if size >= MANY {
-            return Gram::of_many(columns, range);
-        }
         let mut products = products(columns, columns, range, true);
         for i in 0..size {
             for j in 0..i {
                 products[j * size + i] = products[i * size + j];
             }
         }
-        Gram { size, products }
-    }
-
-    /// As [`Gram::of`], the columns side by side in one matrix: many of them do not fit the cache.
-    fn of_many(columns: &[&[f64]], range: Range<usize>) -> Gram {
-        let size = columns.len();
-        let mut all = Mat::zeros(range.len(), size);
-        for (j, column) in columns.iter().enumerate() {
-            all.col_as_slice_mut(j).copy_from_slice(&column[range.clone()]);
-        }
-        let lower = lower_of_product(all.transpose(), all.as_ref());
-        let products =
-            (0..size).flat_map(|i| (0..size).map(move |j| (i.max(j), i.min(j)))).map(|at| lower[at]).collect();
         Gram { size, products }
     }
 
@@ -135,10 +118,6 @@ impl Gram {
         Gram { size, products }
     }
 }
-
-/// From this number of columns on their products are a product of matrices. *Guess*: it changes the time, no result
-/// beyond round-off.
-const MANY: usize = 24;
 
 /// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; with `lower`, only
 /// as many of `b` as the place of the column of `a` says, for products that are symmetric.
@@ -210,22 +189,12 @@ impl WithSimd for Block<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let mut from = 0;
-        while from < self.a.len() {
-            from += match self.a.len() - from {
-                4.. => {
-                    self.meet::<4, S>(simd, from);
-                    4
-                }
-                2.. => {
-                    self.meet::<2, S>(simd, from);
-                    2
-                }
-                _ => {
-                    self.meet::<1, S>(simd, from);
-                    1
-                }
-            };
+        let fours = self.a.len() - self.a.len() % 4;
+        for from in (0..fours).step_by(4) {
+            self.meet::<4, S>(simd, from);
+        }
+        for from in fours..self.a.len() {
+            self.meet::<1, S>(simd, from);
         }
     }
 }
@@ -294,19 +263,8 @@ fn backward(l: &[f64], x: &mut [f64]) {
     }
 }
 
-/// From this number of columns on a factor is that of a library for large matrices. *Guess*: below, calling the library
-/// costs more than it saves.
-const LARGE: usize = 96;
-
 /// Cholesky factor, row by row; none if the matrix is not positive definite or not finite.
 fn factor(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
-    if n >= LARGE {
-        let factor = cholesky(Mat::from_fn(n, n, |i, j| a[i * n + j]).as_ref()).ok()?;
-        let lower = factor.lower();
-        let finite = (0..n).all(|i| lower[(i, i)].is_finite());
-        return finite
-            .then(|| (0..n * n).map(|at| if at % n <= at / n { lower[(at / n, at % n)] } else { 0.0 }).collect());
-    }
     for i in 0..n {
         let (above, row) = a.split_at_mut(i * n);
         for j in 0..i {
