@@ -14,13 +14,8 @@ use super::noise::Noise;
 use super::rows::{Rows, add_scaled, quantile};
 use crate::measurement::Session;
 
-/// Generator turns, torque in units of the load scale, K above nominal, orientation.
-struct RunState {
-    turns: f64,
-    torque: f64,
-    warmer: f64,
-    orientation: f64,
-}
+/// Generator turns, torque in units of the load scale, K above nominal, orientation in rad.
+type RunState = [f64; 4];
 
 /// Rows of an imagined session. *Guess*: enough for the orders of the generator.
 const ROWS: usize = 1500;
@@ -44,55 +39,50 @@ fn steps(share: f64) -> f64 {
 type Run = (&'static str, &'static [fn(f64) -> RunState]);
 
 /// Runs to choose from.
-static MENU: [Run; 6] = {
-    const fn state(turns: f64, torque: f64, warmer: f64, orientation: f64) -> RunState {
-        RunState { turns, torque, warmer, orientation }
-    }
-    [
-        (
-            "one output turn forward and back at steady torque, once with either sign",
-            &[|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)],
-        ),
-        (
-            "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, \
+static MENU: [Run; 6] = [
+    (
+        "one output turn forward and back at steady torque, once with either sign",
+        &[|s| [95.0 * there_and_back(s), 0.7, 0.0, 0.0], |s| [95.0 * there_and_back(s), -0.7, 0.0, 0.0]],
+    ),
+    (
+        "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, \
              90 and 180 degrees",
-            &[
-                |s| state(50.0 * there_and_back(s), steps(s), 0.0, 0.0),
-                |s| state(50.0 * there_and_back(s), steps(s), 0.0, FRAC_PI_2),
-                |s| state(50.0 * there_and_back(s), steps(s), 0.0, PI),
-            ],
-        ),
-        (
-            "torque triangles of three amplitudes through zero, generator creeping",
-            &[|s| {
-                let amplitude = [0.15, 0.4, 1.0][((s * 3.0) as usize).min(2)];
-                let triangle = 2.0 / PI * (TAU * 12.0 * s).sin().asin();
-                state(2.0 * s, amplitude * triangle, 0.0, 0.0)
-            }],
-        ),
-        (
-            "a cold, a hot and again a cold soak, torque steps of both signs at each, slow and fast in both directions",
-            &[
-                |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
-                |s| state(30.0 * there_and_back(s) * s, steps(s), 35.0, 0.0),
-                |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
-            ],
-        ),
-        (
-            "constant speeds from slow to fast in both directions, torque through zero in between",
-            &[|s| {
-                let run = (s * 8.0).floor();
-                let speed = [0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0][(run as usize).min(7)];
-                let before: f64 = [0.0, 0.1, 0.0, 0.3, 0.0, 0.6, 0.0, 1.0][(run as usize).min(7)];
-                state(15.0 * (before + speed * (8.0 * s - run)), 0.7 * (TAU * 10.0 * s).sin(), 0.0, 0.0)
-            }],
-        ),
-        (
-            "torque steps of both signs with the generator at rest, recorded as fast as the encoder allows",
-            &[|s| state(0.01 * s, steps(s), 0.0, 0.0)],
-        ),
-    ]
-};
+        &[
+            |s| [50.0 * there_and_back(s), steps(s), 0.0, 0.0],
+            |s| [50.0 * there_and_back(s), steps(s), 0.0, FRAC_PI_2],
+            |s| [50.0 * there_and_back(s), steps(s), 0.0, PI],
+        ],
+    ),
+    (
+        "torque triangles of three amplitudes through zero, generator creeping",
+        &[|s| {
+            let amplitude = [0.15, 0.4, 1.0][((s * 3.0) as usize).min(2)];
+            let triangle = 2.0 / PI * (TAU * 12.0 * s).sin().asin();
+            [2.0 * s, amplitude * triangle, 0.0, 0.0]
+        }],
+    ),
+    (
+        "a cold, a hot and again a cold soak, torque steps of both signs at each, slow and fast in both directions",
+        &[
+            |s| [30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0],
+            |s| [30.0 * there_and_back(s) * s, steps(s), 35.0, 0.0],
+            |s| [30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0],
+        ],
+    ),
+    (
+        "constant speeds from slow to fast in both directions, torque through zero in between",
+        &[|s| {
+            let run = (s * 8.0).floor();
+            let speed = [0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0][(run as usize).min(7)];
+            let before: f64 = [0.0, 0.1, 0.0, 0.3, 0.0, 0.6, 0.0, 1.0][(run as usize).min(7)];
+            [15.0 * (before + speed * (8.0 * s - run)), 0.7 * (TAU * 10.0 * s).sin(), 0.0, 0.0]
+        }],
+    ),
+    (
+        "torque steps of both signs with the generator at rest, recorded as fast as the encoder allows",
+        &[|s| [0.01 * s, steps(s), 0.0, 0.0]],
+    ),
+];
 
 /// Speeds that differ by less than this factor are one speed. *Guess*.
 const ONE_SPEED: f64 = 1.5;
@@ -168,14 +158,15 @@ fn least_apart(
         .enumerate()
         .map(|(k, at)| {
             let states: Vec<RunState> = (0..ROWS).map(|row| at(row as f64 / ROWS as f64)).collect();
+            let column = |of: usize, value: &dyn Fn(f64) -> f64| states.iter().map(|state| value(state[of])).collect();
             Session {
                 line: (0..ROWS as u64).collect(),
                 time_s: Some((0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect()),
-                generator_rad: states.iter().map(|s| TAU * s.turns * on.nominal.ratio.abs() / 95.0).collect(),
+                generator_rad: column(0, &|turns| TAU * turns * on.nominal.ratio.abs() / 95.0),
                 error_rad: vec![0.0; ROWS],
-                torque_n_m: Some(states.iter().map(|s| s.torque * on.scales.load).collect()),
-                temperature_c: Some(states.iter().map(|s| on.nominal.temperature_c + s.warmer).collect()),
-                orientation_rad: Some(states.iter().map(|s| s.orientation).collect()),
+                torque_n_m: Some(column(1, &|torque| torque * on.scales.load)),
+                temperature_c: Some(column(2, &|warmer| on.nominal.temperature_c + warmer)),
+                orientation_rad: Some(column(3, &|orientation| orientation)),
                 ..Session::default()
             }
         })
