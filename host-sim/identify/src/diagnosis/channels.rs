@@ -153,7 +153,7 @@ impl<'a> Freed<'a> {
 
 /// How the error stands to what a torque should do.
 #[derive(Clone, Copy, Debug)]
-struct Told {
+struct TorqueEffect {
     /// What it should do, arcsec rms.
     size: f64,
     /// Share of it that the error shows, with its standard deviation.
@@ -167,9 +167,9 @@ struct Told {
     clearance: f64,
 }
 
-impl Told {
+impl TorqueEffect {
     /// By nominal wind-up and clearance under `scale` times the recorded torque.
-    fn by(freed: &Freed<'_>, scale: f64) -> Told {
+    fn by(freed: &Freed<'_>, scale: f64) -> TorqueEffect {
         let Freed { sampled, error } = freed;
         let torque: Vec<f64> = sampled.rows.torque.iter().map(|torque| scale * torque).collect();
         let parts = sampled.parts(PlayLaw::Held, &torque).map(|part| sampled.free.freed(part));
@@ -179,16 +179,14 @@ impl Told {
         let wind_up = share_beside(&error, &wound, &play);
         let clearance = share_beside(&error, &play, &wound);
         let should: Vec<f64> = wound.iter().zip(&play).map(|(wound, play)| wound + play).collect();
-        let products: Vec<[f64; 2]> = should
-            .chunks(should.len().div_ceil(BLOCKS).max(1))
-            .zip(error.chunks(should.len().div_ceil(BLOCKS).max(1)))
-            .map(|(w, e)| [w.iter().map(|w| w * w).sum(), w.iter().zip(e).map(|(w, e)| w * e).sum()])
-            .collect();
+        let block = should.len().div_ceil(BLOCKS).max(1);
+        let blocks = should.chunks(block).zip(error.chunks(block));
+        let products: Vec<[f64; 2]> = blocks.map(|(should, error)| [dot(should, should), dot(should, error)]).collect();
         let all = products.iter().fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
         let share = all[1] / all[0].max(1e-12);
         let without: Vec<f64> = products.iter().map(|of| (all[1] - of[1]) / (all[0] - of[0]).max(1e-12)).collect();
         let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
-        Told { size: rms(&should), share, std: jackknife(&without), left, wind_up, clearance }
+        TorqueEffect { size: rms(&should), share, std: jackknife(&without), left, wind_up, clearance }
     }
 
     fn is_certain(&self) -> bool {
@@ -231,16 +229,17 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     let freed = Freed::new(&rows, (nominal, table), &[]);
     let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
     let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
-    let seen = |told: &Told| told.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
+    let seen = |effect: &TorqueEffect| effect.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
     let none = robust_std(freed.error.iter().copied());
-    let told = |scale: f64| Told::by(&freed, scale);
-    let recorded = told(1.0);
-    let of_this_drive = |told: &Told| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.share) && told.is_certain();
+    let under = |scale: f64| TorqueEffect::by(&freed, scale);
+    let recorded = under(1.0);
+    let of_this_drive =
+        |effect: &TorqueEffect| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&effect.share) && effect.is_certain();
     let too_soft = recorded.wind_up > FAR_TOO_SOFT;
     if seen(&recorded) && recorded.share > NO_EFFECT && !too_soft {
         return None;
     }
-    let turned = told(-1.0);
+    let turned = under(-1.0);
     if seen(&turned) && of_this_drive(&turned) && turned.left < EXPLAINS_TURNED * recorded.left.min(none) {
         scale(recording, -1.0);
         let what = format!(
@@ -253,28 +252,28 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     }
     let best = factors(nominal.ratio)
         .into_iter()
-        .map(|factor| (factor, told(factor)))
-        .filter(|(_, told)| !too_soft || (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.wind_up))
-        .filter(|(_, told)| seen(told) && of_this_drive(told) && told.left < EXPLAINS * recorded.left.min(none))
+        .map(|factor| (factor, under(factor)))
+        .filter(|(_, effect)| !too_soft || (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&effect.wind_up))
+        .filter(|(_, effect)| seen(effect) && of_this_drive(effect) && effect.left < EXPLAINS * recorded.left.min(none))
         .min_by(|a, b| a.1.left.total_cmp(&b.1.left));
-    if let Some((unit, (_, told))) = best.as_ref().and_then(|best| Some((unit_of(best.0)?, best))) {
+    if let Some((unit, (_, effect))) = best.as_ref().and_then(|best| Some((unit_of(best.0)?, best))) {
         // A stiffness that looks like another unit is a look, no word: a soft drive does the same.
         let what = format!(
             "the torque leaves {:.0} arcsec as it stands, and {:.0} if it is in {unit}: nothing says so, and it is \
              not converted; if it is, say --columns torque=NAME:{unit}, else the drive is not as stiff as its model \
              says; what the load does cannot be told from what the drive does",
-            recorded.left, told.left
+            recorded.left, effect.left
         );
         recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
         report(recording, FaultName::UnitMismatch, Treatment::Masked, recorded.size, what.clone());
         return Some(what);
     }
-    if let Some((factor, told)) = best {
+    if let Some((factor, effect)) = best {
         scale(recording, factor);
         let what = format!(
             "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of \
                  the nominal ones); as it stands it leaves {:.0} arcsec, so {:.0}: it was converted",
-            told.share, told.std, recorded.left, told.left
+            effect.share, effect.std, recorded.left, effect.left
         );
         report(recording, FaultName::TorqueScale, Treatment::Repaired, none, what);
         return None;
@@ -340,7 +339,7 @@ pub(crate) fn check_degrees(
     if said || !rows.recorded.torque || nominal.wind_up_arcsec(1.0) == 0.0 {
         return Ok(());
     }
-    let told = Told::by(&Freed::new(&rows, (nominal, table), &[]), 1.0);
+    let effect = TorqueEffect::by(&Freed::new(&rows, (nominal, table), &[]), 1.0);
     let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
     let wave = nominal.harmonics.iter().max_by(by_size).map(|wave| {
         // A load that is put on in steps while the generator turns a little looks like a wave: it goes first.
@@ -352,15 +351,15 @@ pub(crate) fn check_degrees(
         let [sine, cosine] = [(&sine, &cosine), (&cosine, &sine)].map(|(a, b)| share_beside(&error, a, b));
         sine.hypot(cosine) / wave.amplitude_arcsec
     });
-    let clearance = (nominal.backlash_arcsec > 0.0).then_some(told.clearance);
+    let clearance = (nominal.backlash_arcsec > 0.0).then_some(effect.clearance);
     let degrees = |share: f64, [low, high]: [f64; 2]| (low * DEGREES..=high * DEGREES).contains(&share);
     let mut others = [wave, clearance].into_iter().flatten().peekable();
     let Some(other) = others.peek().copied() else { return Ok(()) };
-    if !degrees(told.wind_up, OF_THIS_DRIVE) || !others.all(|share| degrees(share, AS_NOMINAL)) {
+    if !degrees(effect.wind_up, OF_THIS_DRIVE) || !others.all(|share| degrees(share, AS_NOMINAL)) {
         return Ok(());
     }
     let [generator, output] = [generator, columns.column(Quantity::Output).0].map(str::to_owned);
-    let why = Refusal::BothInDegrees { wind_up: told.wind_up, other, generator, output };
+    let why = Refusal::BothInDegrees { wind_up: effect.wind_up, other, generator, output };
     Err(MeasuredError::of_file(&recording.file, &why))
 }
 
