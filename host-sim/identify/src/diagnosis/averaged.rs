@@ -2,7 +2,6 @@
 //! an average as the average of what it says of the rows, and is evaluated on a third or a tenth of them.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use super::base::Base;
 use super::candidate::Excitation;
@@ -88,14 +87,18 @@ impl Averaged {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Grain {
     /// The averages, and those that each group of the whitener consists of.
-    averaged: Option<(Arc<Averaged>, Vec<Range<usize>>)>,
+    averaged: Option<(Averaged, Vec<Range<usize>>)>,
 }
 
 impl Grain {
     /// Smooth laws are evaluated on `averaged`, if there is any.
     #[must_use]
-    pub fn new(averaged: Option<Arc<Averaged>>, whitener: &Whitener) -> Grain {
-        Grain { averaged: averaged.map(|averaged| (averaged.clone(), averaged.in_groups(&whitener.groups))) }
+    pub fn new(averaged: Option<Averaged>, whitener: &Whitener) -> Grain {
+        let with_groups = |averaged: Averaged| {
+            let groups = averaged.in_groups(&whitener.groups);
+            (averaged, groups)
+        };
+        Grain { averaged: averaged.map(with_groups) }
     }
 
     /// What a law is evaluated on.

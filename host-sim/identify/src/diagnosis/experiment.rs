@@ -182,7 +182,7 @@ fn least_apart(
     }
     rows.error = truth;
     let imagined = Excitation { rows: &rows, base: &base, ..*on };
-    let problem = Problem::new(&imagined, &base.uncertain, Fineness { stride: 1, noise, worth: 1.0 }, None);
+    let problem = Problem::new(imagined, &base.uncertain, Fineness { stride: 1, noise, worth: 1.0 });
     let scaffold = Scaffold::new(&problem, Vec::new());
     let own = scaffold.fit(Some(&Term::new(&problem, term.law, term.places.clone())))?.solution.misfit;
     let mut least = f64::INFINITY;

@@ -4,12 +4,10 @@
 //! [`Extended::fit_to`] learns from some of the sessions alone, so that what it says of the others was not seen by it.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use flexspline::Table;
 use serde::{Deserialize, Serialize};
 
-use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
 use super::candidate::{Acting, Excitation, Law, LawUnits, Tag, library, together};
 use super::model::{Problem, Scaffold, terms_at};
@@ -18,7 +16,7 @@ use super::report::Parameter;
 use super::resolution::averages_hide;
 use super::rows::{Rows, add_scaled, combined};
 use super::select::{Selected, fixed, less, settle_each};
-use super::thinned::{SampleToFit, Thinned};
+use super::thinned::Thinned;
 use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
 use crate::causes::{CauseName, ParameterName};
 use crate::measurement::Session;
@@ -203,26 +201,20 @@ impl Extended {
             stride = 1;
         }
         let fineness = Fineness { stride, noise, worth };
-        let problem = Problem::new(&on, &uncertain, fineness, Averaged::of(&on, stride).map(Arc::new));
+        let problem = Problem::new(on, &uncertain, fineness);
         let thinned = Thinned::of(&on, stride);
-        let sample = thinned.as_ref().map(|thinned| SampleToFit::new(&on, thinned, &uncertain, stride));
-        let on_sample = sample.as_ref().map(|sample| sample.problem(noise, worth));
+        let on_sample = thinned.as_ref().map(|thinned| thinned.problem(&on, &uncertain, fineness));
         let mut start = super::remembered(&laws, &fixed(on_sample.as_ref().unwrap_or(&problem), &laws, causes));
         if on_sample.is_some() {
             let selected = Selected::of(&problem, terms_at(&problem, &laws, &start));
             let settled = selected.and_then(|selected| settle_each(&problem, selected, false));
             start = super::remembered(&laws, &settled.ok_or(DiagnosisError::NotFinite)?.terms);
         }
-        Extended::of(&problem, laws, &start, fineness).ok_or(DiagnosisError::NotFinite)
+        Extended::of(&problem, laws, &start).ok_or(DiagnosisError::NotFinite)
     }
 
     /// Fits the laws at `start` (index and places), and the nominal model alone.
-    pub(super) fn of(
-        problem: &Problem<'_>,
-        laws: Vec<Law>,
-        start: &[(usize, Vec<f64>)],
-        fineness: Fineness,
-    ) -> Option<Extended> {
+    pub(super) fn of(problem: &Problem<'_>, laws: Vec<Law>, start: &[(usize, Vec<f64>)]) -> Option<Extended> {
         let alone = Scaffold::new(problem, Vec::new()).fit(None)?;
         let selected = Selected::of(problem, terms_at(problem, &laws, start))?;
         let known = uncertainty::known(problem, &selected, 1.0);
@@ -241,7 +233,8 @@ impl Extended {
         };
         let causes = start.iter().cloned().zip(fitted).zip(known).filter_map(cause).collect();
         let (play, scales) = (problem.on.base.law, problem.on.scales.clone());
-        Some(Extended { play, scales, recalibrated: alone.solution.coefficients, base, causes, fineness })
+        let (recalibrated, fineness) = (alone.solution.coefficients, problem.fineness);
+        Some(Extended { play, scales, recalibrated, base, causes, fineness })
     }
 
     /// Causes of the model.

@@ -48,7 +48,6 @@ mod with_speed;
 mod zeros;
 
 use std::collections::HashSet;
-use std::sync::Arc;
 
 use flexspline::Table;
 use thiserror::Error;
@@ -56,7 +55,6 @@ use thiserror::Error;
 use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use averaged::Averaged;
 use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
 pub use explain::Explanation;
 pub(crate) use extended::nominal_arcsec;
@@ -68,12 +66,12 @@ pub use pipeline::{
     parse_rows, read_rows,
 };
 use prepare::FreeColumns;
+
 pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
-use remainder::SpectralLine;
 use resolution::hidden_by_averages;
 use rows::Rows;
 use select::{Bests, Chooser, Scope, Selected};
-use thinned::{SampleToFit, Thinned};
+use thinned::Thinned;
 pub(crate) use trace::{Gate, Judged, Stage, Trace};
 
 /// Why data cannot be diagnosed.
@@ -164,8 +162,8 @@ pub(crate) fn diagnose_extended(
     progress(1, 4, "causes");
     let (search, trace) = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
-    let Problem { noise, worth, whitener, .. } = &search.problem;
-    let (problem, fineness) = (&search.problem, Fineness { stride: whitener.stride, noise: *noise, worth: *worth });
+    let problem = &search.problem;
+    let noise = problem.fineness.noise;
     let terms = terms_at(problem, &search.laws, &search.start);
     let selected = Selected::of(problem, terms).ok_or(DiagnosisError::NotFinite)?;
     let mut start = remembered(&search.laws, &selected.terms);
@@ -174,7 +172,7 @@ pub(crate) fn diagnose_extended(
     let fast = search.fast.iter();
     let fast = fast.map(|(label, size)| Unexplained { looks_like: label.to_string(), size_arcsec: *size });
     left.extend(fast.filter(|line| line.size_arcsec > select::least_size(noise.white)));
-    left.extend(remainder::beyond_noise(problem, &selected, *noise));
+    left.extend(remainder::beyond_noise(problem, &selected, noise));
     for (k, term) in selected.terms.iter().enumerate() {
         let (label, [main, nuisance, beside]) = (term.law.label, select::parts(term, selected.fit.of(k)));
         trace.say(&format_args!("{label}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2} arcsec"));
@@ -182,18 +180,17 @@ pub(crate) fn diagnose_extended(
     for something in &left {
         trace.say(&format_args!("left: {}, {:.2} arcsec", something.looks_like, something.size_arcsec));
     }
-    let sample = search.thinned.as_ref();
-    let sample =
-        sample.map(|thinned| (SampleToFit::new(&on, thinned, &problem.uncertain, fineness.stride), thinned.share));
-    let on_sample = sample.as_ref().map(|(sample, share)| (sample.problem(*noise, *worth), *share));
-    let on_sample = on_sample.as_ref().map(|(sample, share)| (sample, *share));
-    let mut diagnosis = verdict::conclude(&search, &selected, on_sample, left, settings, trace);
+    let on_sample = search
+        .thinned
+        .as_ref()
+        .map(|thinned| (thinned.problem(&on, &problem.uncertain, problem.fineness), thinned.share));
+    let mut diagnosis = verdict::conclude(&search, &selected, &on_sample, left, settings, trace);
     diagnosis.set_aside = prepare::too_few_left(problem, diagnosis.finding);
     drop(selected);
     let is_named = |cause: CauseName| diagnosis.causes.iter().any(|named| named.name == cause);
     start.retain(|(law, _)| search.laws[*law].cause().is_none_or(is_named));
     let Search { problem, laws, .. } = search;
-    let extended = Extended::of(&problem, laws, &start, fineness).ok_or(DiagnosisError::NotFinite)?;
+    let extended = Extended::of(&problem, laws, &start).ok_or(DiagnosisError::NotFinite)?;
     Ok((diagnosis, extended))
 }
 
@@ -225,7 +222,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Searches, with every decision on the way.
-    fn new(on: &'a Excitation<'a>, settings: &Settings<'_>) -> Result<(Search<'a>, Trace), DiagnosisError> {
+    fn new(on: &Excitation<'a>, settings: &Settings<'_>) -> Result<(Search<'a>, Trace), DiagnosisError> {
         let mut laws = library(on);
         laws.extend(unnamed(on));
         laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.contains(&cause)));
@@ -235,92 +232,77 @@ impl<'a> Search<'a> {
                 trace.decided(Stage::Data, (*cause).into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
             }
         }
-        let mut hung = vec![false; on.rows.len()];
-        let mut uncertain = prepare::uncertain(on, &[], &hung);
         // Rows to an average that leave about as many averages as asked for, unless they hide something.
         let usual = (on.rows.count_used() / settings.averages).max(1);
-        let at_first = hidden_by_averages(on, &laws, &uncertain, usual, &[]);
-        let mut stride = if at_first.is_some() { 1 } else { usual };
-        let mut averaged = Averaged::of(on, stride).map(Arc::new);
-        let mut free = FreeColumns::of(on, &laws, averaged.clone());
-        let (mut noise, mut worth) = prepare::noise(on, &free, at_first.as_deref().unwrap_or(&[]), &uncertain, None);
-        say_noise(&trace, noise, worth);
-        let mut problem = Problem::new(on, &uncertain, Fineness { stride, noise, worth }, averaged.clone());
-        let mut fast: Vec<(Label, f64)> = Vec::new();
-        let mut start = Places::new();
-        let mut bests = Bests::default();
-        let mut thinned = Thinned::of(on, stride);
+        let (mut stride, mut free): (usize, Option<FreeColumns>) = (usual, None);
+        let (mut hung, mut explained) = (vec![false; on.rows.len()], vec![0.0; on.rows.len()]);
+        let mut uncertain = prepare::uncertain(on, &[], &hung);
+        let (mut fast, mut start, mut bests) = (Vec::new(), Places::new(), Bests::default());
+        let mut last: Option<(Problem<'a>, Option<Thinned>)> = None;
+        let (mut new_line, mut other_rows) = (false, false);
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
         for round in 0..=MOST_ROUNDS {
-            fast.clear();
-            let mut scope = Scope::Everything;
-            if let Some(thinned) = &thinned {
-                let sample = SampleToFit::new(on, thinned, &uncertain, stride);
-                choose(&sample.problem(noise, worth), &laws, &mut start, (&mut bests, scope, &mut trace))?;
-                scope = Scope::CameClose;
-            }
-            let selected = choose(&problem, &laws, &mut start, (&mut bests, scope, &mut trace))?;
-            if round == MOST_ROUNDS {
-                break;
-            }
-            let (hidden, slow): (Vec<SpectralLine>, Vec<SpectralLine>) = remainder::lines(&problem, &selected, noise)
-                .into_iter()
-                .partition(|line| remainder::averaged_away(&problem, line));
-            for line in hidden {
-                let label = Label::Line { per: line.per, order: line.order };
-                if fast.iter().all(|(known, _)| known.to_string() != label.to_string()) {
-                    trace.say(&format_args!("{label}: {:.2} arcsec, too fast for averages", line.size_arcsec));
-                    fast.push((label, line.size_arcsec));
-                }
-            }
-            let mut explained = remainder::explained(&problem, &selected);
-            // What hung once hung, whatever is taken for it later.
-            for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained, noise.white)) {
-                *hung |= hangs;
-            }
-            let doubtful = prepare::uncertain(on, &selected.terms, &hung);
-            let hangs =
-                doubtful.iter().zip(&uncertain).zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
-            drop(selected);
-            let known = laws.len();
-            for found in slow {
-                let law = line(found.per, found.order);
-                if laws.iter().all(|l| l.label != law.label) {
-                    trace.say(&format_args!("{}: {:.2} arcsec", law.label, found.size_arcsec));
-                    laws.push(law);
-                }
-            }
-            let new_line = laws.len() > known;
-            let changed = doubtful.iter().zip(&uncertain).filter(|(a, b)| a != b).count();
-            let other_rows = changed > on.rows.len() / 200 || hangs;
-            uncertain = doubtful;
             // What was large may have hidden what is fast.
             let hidden = hidden_by_averages(on, &laws, &uncertain, usual, &explained);
             let closer_look = hidden.is_some() && stride > 1;
             if closer_look {
-                stride = 1;
-                averaged = Averaged::of(on, stride).map(Arc::new);
-                thinned = Thinned::of(on, stride);
+                (stride, free) = (1, None);
             }
-            if closer_look || !free.are_of(&laws) {
-                free = FreeColumns::of(on, &laws, averaged.clone());
-            }
+            let free_now = free.get_or_insert_with(|| FreeColumns::of(on, &laws, stride));
             explained.iter_mut().zip(hidden.iter().flatten()).for_each(|(sum, fast)| *sum += fast);
-            let (again, worth_again) = {
-                let explained: &[f64] = if new_line { &[] } else { &explained };
-                prepare::noise(on, &free, explained, &uncertain, Some(noise))
-            };
-            let change = again.floor() / noise.floor();
-            if !new_line && !other_rows && !closer_look && (0.85..1.18).contains(&change) {
+            let before = last.as_ref().map(|(problem, _)| problem.fineness.noise);
+            let explained_now: &[f64] = if new_line { &[] } else { &explained };
+            let (noise, worth) = prepare::noise(on, free_now, explained_now, &uncertain, before);
+            let as_before = |before: Noise| (0.85..1.18).contains(&(noise.floor() / before.floor()));
+            if !new_line && !other_rows && !closer_look && before.is_some_and(as_before) {
                 break;
             }
             if new_line {
                 start.clear();
             }
-            (noise, worth) = (again, worth_again);
             say_noise(&trace, noise, worth);
-            problem = Problem::new(on, &uncertain, Fineness { stride, noise, worth }, averaged.clone());
+            let problem = Problem::new(*on, &uncertain, Fineness { stride, noise, worth });
+            let thinned = Thinned::of(on, stride);
+            let mut scope = Scope::Everything;
+            if let Some(thinned) = &thinned {
+                let sample = thinned.problem(on, &uncertain, problem.fineness);
+                choose(&sample, &laws, &mut start, (&mut bests, scope, &mut trace))?;
+                scope = Scope::CameClose;
+            }
+            let selected = choose(&problem, &laws, &mut start, (&mut bests, scope, &mut trace))?;
+            fast.clear();
+            if round < MOST_ROUNDS {
+                let mut slow = Vec::new();
+                for line in remainder::lines(&problem, &selected, noise) {
+                    let (label, size_arcsec) = (Label::Line { per: line.per, order: line.order }, line.size_arcsec);
+                    if remainder::averaged_away(&problem, &line) {
+                        trace.say(&format_args!("{label}: {size_arcsec:.2} arcsec, too fast for averages"));
+                        fast.push((label, size_arcsec));
+                    } else if laws.iter().all(|law| law.label != label) {
+                        trace.say(&format_args!("{label}: {size_arcsec:.2} arcsec"));
+                        slow.push(line);
+                    }
+                }
+                explained = remainder::explained(&problem, &selected);
+                // What hung once hung, whatever is taken for it later.
+                for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained, noise.white)) {
+                    *hung |= hangs;
+                }
+                let doubtful = prepare::uncertain(on, &selected.terms, &hung);
+                drop(selected);
+                let pairs = || doubtful.iter().zip(&uncertain);
+                let hangs = pairs().zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
+                other_rows = hangs || pairs().filter(|(a, b)| a != b).count() > on.rows.len() / 200;
+                uncertain = doubtful;
+                new_line = !slow.is_empty();
+                if new_line {
+                    laws.extend(slow.iter().map(|found| line(found.per, found.order)));
+                    free = None;
+                }
+            }
+            last = Some((problem, thinned));
         }
+        let (problem, thinned) = last.ok_or(DiagnosisError::NotFinite)?;
         Ok((Search { laws, problem, thinned, start, bests, fast }, trace))
     }
 }
@@ -335,7 +317,7 @@ fn choose<'l>(
     start: &mut Places,
     (bests, scope, trace): (&mut Bests, Scope, &mut Trace),
 ) -> Result<Selected<'l>, DiagnosisError> {
-    let least = select::least_size(problem.noise.white);
+    let least = select::least_size(problem.fineness.noise.white);
     let chooser = Chooser { problem, laws, least, bests, scope, trace, given: HashSet::new() };
     let selected = chooser.select(terms_at(problem, laws, start)).ok_or(DiagnosisError::NotFinite)?;
     *start = remembered(laws, &selected.terms);

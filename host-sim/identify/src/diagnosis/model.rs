@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::Fineness;
 use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Coefficients, Excitation, Law, Regressor, Tag, Tolerance, left_by};
-use super::noise::{Noise, Whitener};
+use super::noise::Whitener;
 use super::products::{Products, Set};
 use super::rows::{combined, rms};
 use crate::linear::{Gram, Prior, Solution, products, solve};
@@ -20,7 +20,7 @@ use crate::linear::{Gram, Prior, Solution, products, solve};
 /// Data and nominal model, averaged and white.
 pub(crate) struct Problem<'a> {
     /// What laws are evaluated on.
-    pub on: &'a Excitation<'a>,
+    pub on: Excitation<'a>,
     /// Rows whose flank is not known well.
     pub uncertain: Vec<bool>,
     /// Noise.
@@ -35,10 +35,8 @@ pub(crate) struct Problem<'a> {
     pub base: Vec<Vec<f64>>,
     /// `base`, whitened.
     base_white: Set,
-    /// The noise of a row.
-    pub noise: Noise,
-    /// Worth of the information, at most 1.
-    pub worth: f64,
+    /// Rows to an average, noise and information weight.
+    pub fineness: Fineness,
     /// What laws are evaluated on.
     grain: Grain,
     /// What was evaluated where laws are tried first.
@@ -72,15 +70,9 @@ enum Extent {
 impl<'a> Problem<'a> {
     /// Averages and whitens.
     #[must_use]
-    pub fn new(
-        on: &'a Excitation<'a>,
-        uncertain: &[bool],
-        fineness: Fineness,
-        averaged: Option<Arc<Averaged>>,
-    ) -> Problem<'a> {
-        let Fineness { stride, noise, worth } = fineness;
-        let whitener = Whitener::new(on.rows, uncertain, stride, noise);
-        let grain = Grain::new(averaged, &whitener);
+    pub fn new(on: Excitation<'a>, uncertain: &[bool], fineness: Fineness) -> Problem<'a> {
+        let whitener = Whitener::new(on.rows, uncertain, fineness.stride, fineness.noise);
+        let grain = Grain::new(Averaged::of(&on, fineness.stride), &whitener);
         let data = whitener.average(&on.left(&[]));
         let data_white = Set::new(vec![whitener.whiten_averaged(&data)]);
         let base: Vec<Vec<f64>> = on.base.floating.iter().map(|f| whitener.average(&f.values)).collect();
@@ -97,8 +89,7 @@ impl<'a> Problem<'a> {
             data_white,
             base,
             base_white,
-            noise,
-            worth,
+            fineness,
             grain,
             tried,
             products,
@@ -143,7 +134,7 @@ impl<'a> Problem<'a> {
 
     /// What a law is evaluated on, with nothing that other causes change.
     fn excitation(&self, law: &Law) -> Excitation<'_> {
-        self.grain.excitation(law.smooth(), self.on)
+        self.grain.excitation(law.smooth(), &self.on)
     }
 
     fn base_priors(&self) -> Vec<Prior> {
@@ -347,7 +338,7 @@ pub(super) fn within_tolerance(
     let limits: Vec<Option<f64>> = priors.iter().enumerate().map(|(k, prior)| held_at(k, prior)).collect();
     let mut held = vec![false; priors.len()];
     for _ in 0..MOST_HOLDS {
-        let solution = solve(gram, &priors, problem.worth)?;
+        let solution = solve(gram, &priors, problem.fineness.worth)?;
         let mut beyond = false;
         for (k, limit) in limits.iter().enumerate() {
             let Some(limit) = limit.filter(|limit| !held[k] && solution.coefficients[k].abs() > *limit) else {
@@ -361,7 +352,7 @@ pub(super) fn within_tolerance(
             return Some((solution, priors));
         }
     }
-    Some((solve(gram, &priors, problem.worth)?, priors))
+    Some((solve(gram, &priors, problem.fineness.worth)?, priors))
 }
 
 /// Times that parameters beyond their tolerance are held, at most. *Guess*: each time holds all that are beyond at
@@ -506,7 +497,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let inside = self.problem.products.gram(&self.problem.sets(&self.terms, further), Some(block));
         let mut outside = fit.gram.clone();
         outside.add(&inside, -1.0);
-        Some((solve(&outside, &fit.priors, self.problem.worth)?, inside))
+        Some((solve(&outside, &fit.priors, self.problem.fineness.worth)?, inside))
     }
 
     /// A law among the terms.
@@ -659,7 +650,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let with: Vec<&[f64]> = known.iter().chain(&new).copied().collect();
                 let meeting: Vec<Vec<f64>> =
                     products(&new, &with, 0..mask.len(), false).chunks_exact(with.len()).map(<[f64]>::to_vec).collect();
-                let solution = solve(&gram.with(&meeting), &all, problem.worth);
+                let solution = solve(&gram.with(&meeting), &all, problem.fineness.worth);
                 let found = solution.map(|s| {
                     law.beginnings(&law.values(&places), lead_columns.by_role(&s.coefficients[priors.len()..]))
                 });

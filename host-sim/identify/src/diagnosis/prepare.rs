@@ -1,7 +1,6 @@
 //! What has to be known before causes are compared: how noisy the data are, and where they jump.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 use flexspline::Table;
 use rayon::prelude::*;
@@ -294,17 +293,16 @@ const RARE: f64 = 0.1;
 pub(crate) struct FreeColumns {
     /// Averages of this number of rows.
     stride: usize,
-    /// Laws that they are of.
-    laws: usize,
     columns: Vec<Vec<f64>>,
     priors: Vec<Prior>,
 }
 
 impl FreeColumns {
-    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on `averaged`, if
-    /// there is any.
+    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on averages of `finest`
+    /// rows, if these hold for them.
     #[must_use]
-    pub fn of(on: &Excitation<'_>, laws: &[Law], averaged: Option<Arc<Averaged>>) -> FreeColumns {
+    pub fn of(on: &Excitation<'_>, laws: &[Law], finest: usize) -> FreeColumns {
+        let averaged = Averaged::of(on, finest);
         let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride);
         let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
         let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
@@ -327,13 +325,7 @@ impl FreeColumns {
         let by_law: Vec<Vec<(Vec<f64>, Prior)>> = laws.par_iter().with_max_len(1).map(of_law).collect();
         let all = on.base.floating.iter().map(floating).chain(by_law.into_iter().flatten());
         let (columns, priors) = all.unzip();
-        FreeColumns { stride, laws: laws.len(), columns, priors }
-    }
-
-    /// Whether they are still those of the laws.
-    #[must_use]
-    pub(crate) fn are_of(&self, laws: &[Law]) -> bool {
-        self.laws == laws.len()
+        FreeColumns { stride, columns, priors }
     }
 }
 

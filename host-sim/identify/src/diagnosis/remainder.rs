@@ -32,7 +32,7 @@ pub(crate) struct SpectralLine {
 /// The part of the error that base and terms explain in addition to the nominal prediction, row by row, arcsec.
 #[must_use]
 pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
-    let on = problem.on;
+    let on = &problem.on;
     let causes: Vec<Acting<'_>> =
         selected.terms.iter().enumerate().map(|(k, term)| term.acting(selected.fit.of(k))).collect();
     let of_causes = together(on, &causes);
@@ -43,7 +43,7 @@ pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f
 
 /// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
 fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
-    let on = problem.on;
+    let on = &problem.on;
     let left = on.left(&explained(problem, selected));
     let whitener = Whitener::new(on.rows, &problem.uncertain, 1, noise);
     let mut white = whitener.in_rows(&whitener.whiten(&left), on.rows.len());
@@ -135,7 +135,7 @@ pub(crate) fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise
     let left = left(problem, selected);
     let wander = problem.whitener.followed(&left);
     let size = problem.certain_rms(&wander);
-    let restless = problem.worth < LEAST_WORTH && noise.wander > noise.white;
+    let restless = problem.fineness.worth < LEAST_WORTH && noise.wander > noise.white;
     // The largest and fastest wander that is tried: what is there is larger or faster still.
     let restless = restless || noise.wander >= super::prepare::MOST_WANDER * noise.white;
     if restless || size > MOST_WANDER_ARCSEC.max(MOST_WANDER_OF_WHITE * noise.white) {

@@ -44,25 +44,25 @@ impl RefittedCause<'_> {
 }
 
 /// A sample of the rows on which rivals are looked at first, and its share of all rows.
-pub(crate) type OnSample<'p, 'a> = Option<(&'p Problem<'a>, f64)>;
+pub(crate) type OnSample<'a> = Option<(Problem<'a>, f64)>;
 
 /// Rivals of term `k`, whose contribution is `size` arcsec rms, closest first. With a sample only those that are near
 /// there are refitted to all rows.
 #[must_use]
 pub(super) fn rivals<'l>(
     Search { problem, laws, bests, .. }: &'l Search<'_>,
-    sample: OnSample<'_, '_>,
+    sample: &OnSample<'_>,
     selected: &Selected<'_>,
     (k, size): (usize, f64),
 ) -> Vec<RefittedCause<'l>> {
     let open: Vec<&Law> =
         laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
     let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
-    let of_sample = sample.and_then(|(sample, share)| {
+    let of_sample = sample.as_ref().and_then(|(sample, share)| {
         let terms = selected.terms.iter().map(|t| Term::new(sample, t.law, t.places.clone())).collect();
         let terms = among_each_other(sample, terms);
         let there = Selected::of(sample, terms)?;
-        Some((refitted(sample, &open, &there, begin, (k, size)), share))
+        Some((refitted(sample, &open, &there, begin, (k, size)), *share))
     });
     let mut rivals: Vec<RefittedCause<'l>> = match of_sample {
         None => refitted(problem, &open, selected, begin, (k, size)),
@@ -97,7 +97,7 @@ fn refitted<'l>(
     let now = selected.predicted(problem);
     let of_tolerance = selected.terms[k].law.acts.tolerance_of.is_some();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
-    let left = selected.fit.solution.misfit / (problem.worth * problem.data.len().max(1) as f64);
+    let left = selected.fit.solution.misfit / (problem.fineness.worth * problem.data.len().max(1) as f64);
     open.par_iter()
         .with_max_len(1)
         .filter_map(|law| {

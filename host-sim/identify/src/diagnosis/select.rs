@@ -378,7 +378,7 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[Term<'_>], fewer: &[Term<'_>]) 
         (0..problem.blocks().len()).map(of_block).sum()
     };
     match (misfit(terms), misfit(fewer)) {
-        (Some(with), Some(without)) => (without - with) * problem.worth,
+        (Some(with), Some(without)) => (without - with) * problem.fineness.worth,
         _ => 0.0,
     }
 }

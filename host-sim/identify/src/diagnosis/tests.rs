@@ -829,7 +829,7 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
         found = Some(
             super::prepare::noise(
                 on,
-                &super::FreeColumns::of(on, &laws, None),
+                &super::FreeColumns::of(on, &laws, 1),
                 &[],
                 &super::prepare::uncertain(on, &[], &[]),
                 None,

@@ -3,14 +3,10 @@
 //! The sample is made of stretches of neighbouring rows, so that tooth mesh, play and ringing are in it as they are in
 //! the rows. One stretch is taken out of every few, at a place that no period of the drive follows.
 
-use std::sync::Arc;
-
 use super::Fineness;
-use super::averaged::Averaged;
 use super::base::{Base, Floating};
 use super::candidate::Excitation;
 use super::model::Problem;
-use super::noise::Noise;
 use super::rows::{Rows, parts};
 
 /// Rows of a sample, about. *Guess*: enough for three causes with some dozen columns.
@@ -66,30 +62,12 @@ impl Thinned {
         };
         Some(Thinned { rows, base, kept, share })
     }
-}
 
-/// The sample as models are fitted to it.
-pub(crate) struct SampleToFit<'a> {
-    on: Excitation<'a>,
-    uncertain: Vec<bool>,
-    stride: usize,
-    averaged: Option<Arc<Averaged>>,
-}
-
-impl<'a> SampleToFit<'a> {
-    /// The sample where these of all rows are uncertain, averaged as it was made for.
+    /// The sample as models are fitted to it, where these of all rows are uncertain.
     #[must_use]
-    pub fn new(on: &Excitation<'a>, thinned: &'a Thinned, uncertain: &[bool], stride: usize) -> SampleToFit<'a> {
-        let on = on.over(&thinned.rows, &thinned.base);
-        let averaged = Averaged::of(&on, stride).map(Arc::new);
-        SampleToFit { on, uncertain: thinned.kept.iter().map(|k| uncertain[*k]).collect(), stride, averaged }
-    }
-
-    /// The sample under this noise.
-    #[must_use]
-    pub fn problem(&self, noise: Noise, worth: f64) -> Problem<'_> {
-        let fineness = Fineness { stride: self.stride, noise, worth };
-        Problem::new(&self.on, &self.uncertain, fineness, self.averaged.clone())
+    pub fn problem<'a>(&'a self, on: &Excitation<'a>, uncertain: &[bool], fineness: Fineness) -> Problem<'a> {
+        let uncertain: Vec<bool> = self.kept.iter().map(|k| uncertain[*k]).collect();
+        Problem::new(on.over(&self.rows, &self.base), &uncertain, fineness)
     }
 }
 

@@ -39,8 +39,10 @@ fn stretched(problem: &Problem<'_>, fit: &Fit, white: &[&[f64]]) -> Vec<f64> {
         let len = session.len();
         for part in 0..STRETCHES {
             let block = session.start + len * part / STRETCHES..session.start + len * (part + 1) / STRETCHES;
-            let score: Vec<f64> =
-                white[..n].iter().map(|c| problem.worth * dot(&c[block.clone()], &left[block.clone()])).collect();
+            let score: Vec<f64> = white[..n]
+                .iter()
+                .map(|c| problem.fineness.worth * dot(&c[block.clone()], &left[block.clone()]))
+                .collect();
             let moved: Vec<f64> = bread.chunks_exact(n).map(|row| dot(row, &score)).collect();
             sandwich.iter_mut().zip(outer(&moved)).for_each(|(sum, product)| *sum += product);
         }
@@ -234,7 +236,7 @@ fn parameters(
     spread: &TermCovariance,
     beyond: f64,
 ) -> (BTreeMap<&'static str, Parameter>, f64) {
-    let value = |c: &[f64], places: &[f64]| term.law.parameters(problem.on, &term.law.values(places), term.by_role(c));
+    let value = |c: &[f64], places: &[f64]| term.law.parameters(&problem.on, &term.law.values(places), term.by_role(c));
     let at = value(coefficients, &term.places);
     let dimension = coefficients.len() + term.places.len();
     let mut slopes = vec![vec![0.0; dimension]; at.len()];

@@ -25,13 +25,13 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 pub(super) fn conclude(
     search: &Search<'_>,
     selected: &Selected<'_>,
-    sample: rivals::OnSample<'_, '_>,
+    sample: &rivals::OnSample<'_>,
     mut left_over: Vec<Unexplained>,
     settings: &Settings<'_>,
     mut trace: Trace,
 ) -> Diagnosis {
     let Search { problem, laws, .. } = search;
-    let noise = problem.noise;
+    let noise = problem.fineness.noise;
     let hidden_lines: Vec<Label> = search.fast.iter().map(|(label, _)| *label).collect();
     let standings = standings(problem, selected);
     for (k, term) in selected.terms.iter().enumerate() {
@@ -111,7 +111,7 @@ pub(super) fn conclude(
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
                 let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
-                next_experiment = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &named, noise)
+                next_experiment = experiment::next(&problem.on, &selected.terms[k], selected.fit.of(k), &named, noise)
                     .map(|(text, apart)| {
                         format!("{text}; expected to tell them apart by {apart:.0} standard deviations")
                     });
@@ -134,7 +134,7 @@ pub(super) fn conclude(
     let experiment_for_asked = settings.asked.filter(not_named).and_then(|asked| {
         let k = selected.terms.iter().position(|term| causes.first().is_some_and(|first| term.law.is(first.name)))?;
         let law = laws.iter().find(|law| law.is(asked))?;
-        Some(experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &[law], noise)?.0)
+        Some(experiment::next(&problem.on, &selected.terms[k], selected.fit.of(k), &[law], noise)?.0)
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
@@ -146,7 +146,7 @@ pub(super) fn conclude(
         waves_per_generator_turn(cause.name, &known[k], problem.on.nominal)
     };
     let turned = || causes.iter().find_map(once_in_a_turn).map(experiment::turn_the_encoder);
-    let anyhow = || (verdict != Verdict::None).then(|| experiment::anyhow(problem.on, verdict == Verdict::Unknown));
+    let anyhow = || (verdict != Verdict::None).then(|| experiment::anyhow(&problem.on, verdict == Verdict::Unknown));
     let next_experiment = next_experiment.or_else(turned).or_else(anyhow);
     // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
     let mut held_out = held.total;
