@@ -295,37 +295,57 @@ impl<T: Words> Sealed<T> {
     #[cold]
     #[inline(never)]
     fn mended(&self) -> Option<T> {
-        let ([low, high], mut kept) = (self.sums, self.kept);
-        let wanted = low as u64 | (high as u64) << 32;
-        mend(wanted, Self::found(&self.kept), &mut |see| kept.each(see)).then_some(kept)
+        let mut kept = self.kept;
+        let [low, high] = self.sums;
+        let mut mending = Mending::new(low as u64 | (high as u64) << 32, Self::found(&kept));
+        kept.each(&mut |word| mending.back(word));
+        kept.each(&mut |word| mending.on(word));
+        mending.is_done().then_some(kept)
     }
 }
 
-/// Is shown a word, and says what is to stand in its place.
-type Change<'c> = &'c mut dyn FnMut(u32) -> u32;
+/// Restores the word of which neighbouring bits changed: word after word, first back, then on. Calls of all types, as
+/// they divide and are rarely made.
+struct Mending {
+    wanted: u64,
+    /// What a word at this place has to change by.
+    missing: u64,
+    sum: u64,
+}
 
-/// Restores the word of which neighbouring bits changed, if the sum is `found` and was `wanted`; false if no such
-/// change explains it. `each` visits the words. One function for all types: it divides, and is rarely called.
-#[inline(never)]
-fn mend(wanted: u64, found: u64, each: &mut dyn FnMut(Change<'_>)) -> bool {
-    if is_burst(wanted ^ found) {
-        return true;
+impl Mending {
+    /// From the sum that is wanted and the one that was found. Where neighbouring bits of the sum itself changed no word
+    /// is missed.
+    #[inline(never)]
+    fn new(wanted: u64, found: u64) -> Self {
+        let (one, other) = (reduced(wanted), reduced(found));
+        let missing = if one >= other { one.wrapping_sub(other) } else { PRIME.wrapping_sub(other.wrapping_sub(one)) };
+        if is_burst(wanted ^ found) {
+            return Self { wanted: found, missing: 0, sum: START };
+        }
+        Self { wanted, missing, sum: START }
     }
-    let (one, other) = (reduced(wanted), reduced(found));
-    let mut missing = if one >= other { one.wrapping_sub(other) } else { PRIME.wrapping_sub(other.wrapping_sub(one)) };
-    // What the first word has to change by: it went through a step for each word, and the last.
-    each(&mut |word| {
-        missing = longer(missing);
+
+    /// A word that is stepped back over: what is missing went through a step for each word, and the last.
+    #[inline(never)]
+    fn back(&mut self, word: u32) -> u32 {
+        self.missing = longer(self.missing);
         word
-    });
-    let mut sum = START;
-    each(&mut |word| {
-        let word = restored(word, missing);
-        missing = shorter(missing);
-        sum = add(sum, word);
+    }
+
+    /// A word, restored if it is the one.
+    #[inline(never)]
+    fn on(&mut self, word: u32) -> u32 {
+        let word = restored(word, self.missing);
+        self.missing = shorter(self.missing);
+        self.sum = add(self.sum, word);
         word
-    });
-    add(sum, 0) == wanted
+    }
+
+    /// Whether all words together have the sum.
+    fn is_done(&self) -> bool {
+        add(self.sum, 0) == self.wanted
+    }
 }
 
 /// A word changed by what the sum misses, if that is a change of neighbouring bits; else as it is.
