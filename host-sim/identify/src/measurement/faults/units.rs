@@ -4,12 +4,15 @@
 //! the mapping that mends them; columns that are exchanged are put right. A torque or a temperature that cannot be in
 //! the unit given is left out, with the units that it may have and how to say them.
 
+use std::f64::consts::TAU;
+
 use super::{Findings, LineFit, extent};
 use crate::measurement::columns::{MappedColumn, Quantity, Reading, Unit};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::{FEWEST_ROWS, Log};
 use crate::measurement::refusal::Refusal;
+use crate::measurement::rollover::begins_anew;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
 /// The output must have turned by this angle, by the generator or by itself, before the ratio is judged, rad. *Source*:
@@ -109,14 +112,47 @@ fn temperature(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings)
     mismatch(log, Some(Quantity::Temperature), Treatment::Masked, what, findings);
 }
 
-/// Turns of the output for each of the generator, between the farthest two rows of the session in which that turns
-/// farthest; how far it turns there, and how far the output goes in all, rad.
+/// Turns of the output for each of the generator, and how far the output went.
+///
+/// The farthest two rows of each session give the ratio that clearance moves least; the median over pieces of the
+/// sessions stands in where a jump has moved one of the two.
 fn slope(log: &Log) -> Option<(f64, f64, f64)> {
     let (generator, output) = (log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
-    let of_sessions = log.sessions().filter_map(|rows| extent(generator, output, rows));
-    let (psi, delta) = of_sessions.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(psi, _)| *psi > 0.0)?;
-    let (least, most) = least_and_most(output.iter().copied());
-    Some((delta / psi, psi, most - least))
+    let mut whole: Option<(f64, f64)> = None;
+    let mut pieces: Vec<(f64, f64)> = Vec::new();
+    for rows in log.sessions() {
+        if let Some(found) = extent(generator, output, rows.clone())
+            && whole.is_none_or(|(psi, _)| found.0 > psi)
+        {
+            whole = Some(found);
+        }
+        let size = (rows.len() / 32).max(2);
+        let ends = |start: usize| start..(start + size).min(rows.end);
+        pieces.extend(rows.clone().step_by(size).filter_map(|start| extent(generator, output, ends(start))));
+    }
+    let (psi, delta) = whole.filter(|(psi, _)| *psi > 0.0)?;
+    // An output that stands still says nothing of the ratio, unless it always does.
+    if pieces.iter().any(|(_, delta)| *delta != 0.0) {
+        pieces.retain(|(_, delta)| *delta != 0.0);
+    }
+    let median = typical_slope(pieces);
+    let slope = if (delta / psi - median).abs() <= 0.1 * median.abs() { delta / psi } else { median };
+    let travel = least_and_most(output.iter().copied());
+    Some((slope, psi, travel.1 - travel.0))
+}
+
+/// The slope that half of all motion falls short of: a generator that froze and leaps on is one piece of many, however
+/// far it leaps.
+fn typical_slope(mut pieces: Vec<(f64, f64)>) -> f64 {
+    pieces.retain(|(psi, _)| *psi > 0.0);
+    pieces.sort_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
+    let half = 0.5 * pieces.iter().map(|(psi, _)| psi).sum::<f64>();
+    let mut passed = 0.0;
+    let middle = pieces.iter().find(|(psi, _)| {
+        passed += psi;
+        passed >= half
+    });
+    middle.map_or(0.0, |(psi, delta)| delta / psi)
 }
 
 fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
@@ -143,12 +179,7 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
     );
     let exchanged = found / gear.ratio.powi(2);
     if (exchanged - 1.0).abs() <= 2.5 * SAME {
-        let what = format!("{seen}: the two columns are exchanged, and were put right");
-        mismatch(log, None, Treatment::Repaired, what, findings);
-        if let (Some(a), Some(b)) = (log.take(Quantity::Generator), log.take(Quantity::Output)) {
-            log.put(Quantity::Generator, b);
-            log.put(Quantity::Output, a);
-        }
+        exchange(log, &seen, findings);
         return Ok(());
     }
     if let Some(other) = gear.other_wheel_ratio
@@ -161,14 +192,15 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         let readings = vec![format!("--columns output={output}:-{output_unit}"), format!("the ratio {}", -gear.ratio)];
         return Err(Refusal::OtherReading { seen, why: "the output counts the other way", readings });
     }
-    // A column in a unit other than the one given.
+    // A column in a unit other than the one given, by the ratio or by the turn after which it begins anew.
     let mut readings = Vec::new();
     for channel in [Quantity::Generator, Quantity::Output] {
         let (name, given) = column(columns, channel);
         for unit in Unit::ANGLES.into_iter().filter(|unit| *unit != given) {
             let scale = unit.factor() / given.factor();
             let ratio = if channel == Quantity::Generator { scale } else { scale.recip() };
-            if (found / ratio - 1.0).abs() <= SAME {
+            let within = |values: &[f64]| begins_anew(values, &[TAU / scale], false, None).is_some();
+            if (found / ratio - 1.0).abs() <= SAME || log.get(channel).is_some_and(within) {
                 readings.push(format!("--columns {channel}={name}:{unit}"));
             }
         }
@@ -177,12 +209,28 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         let why = "one of the two is in another unit, and no size says which for certain";
         return Err(Refusal::OtherReading { seen, why, readings });
     }
+    // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was
+    // found.
+    if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&exchanged) {
+        exchange(log, &seen, findings);
+        return Ok(());
+    }
     Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
         let (generator, output) = (generator.to_owned(), output.to_owned());
         Refusal::OutputStands { generator, output, turned: psi, followed: travel }
     } else {
         Refusal::OtherRatio { seen, factor: RATIO_ERROR[1] }
     })
+}
+
+/// Puts generator and output in each other's place.
+fn exchange(log: &mut Log, seen: &str, findings: &mut Findings) {
+    let what = format!("{seen}: the two columns are exchanged, and were put right");
+    mismatch(log, None, Treatment::Repaired, what, findings);
+    if let (Some(a), Some(b)) = (log.take(Quantity::Generator), log.take(Quantity::Output)) {
+        log.put(Quantity::Generator, b);
+        log.put(Quantity::Output, a);
+    }
 }
 
 /// Whether recorded errors have the size of errors.
@@ -208,6 +256,7 @@ fn error_size(log: &Log, columns: &[MappedColumn]) -> Result<(), Refusal> {
 
 #[cfg(test)]
 mod tests {
+    use super::typical_slope;
     use crate::measurement::{ColumnMap, FaultName, Gear, Quantity, Recording, Treatment, parse};
 
     /// A drive of ratio 50 to and fro under a load in N·m at a temperature in °C, each times and plus something; angles
@@ -300,5 +349,14 @@ mod tests {
             assert!(said.contains("no size says which") && said.contains("generator=generator_rad:"), "{said}");
             assert!(said.contains("or --columns output=output_rad:"), "{said}");
         }
+    }
+
+    #[test]
+    fn one_leap_of_a_generator_that_froze_does_not_change_the_ratio() {
+        // Slow pieces of a drive of ratio 80, and the piece in which it leaps by more than six of them together.
+        let mut pieces = vec![(10.0, 0.125); 20];
+        pieces.push((70.0, 0.05));
+        assert_eq!(typical_slope(pieces), 0.0125);
+        assert_eq!(typical_slope(vec![(0.0, 0.0)]), 0.0);
     }
 }
