@@ -1,9 +1,8 @@
 //! Time that does not run as it should, and the gaps that part sessions.
 
 use std::f64::consts::TAU;
-use std::ops::Range;
 
-use super::{Findings, add_steps, marked};
+use super::{Findings, marked};
 use crate::measurement::columns::{MappedColumn, Quantity};
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::log::Log;
@@ -13,18 +12,15 @@ use flexspline_base::robust::{median_and_std, median_of, quantile_of, sampled};
 /// A gap longer than this number of sample periods starts a new session. *Source*: by definition
 /// (`docs/how-to/diagnosis.md`).
 pub(crate) const SESSION_GAP_PERIODS: f64 = 10.0;
-/// A step of time above this number of periods may have a row missing in it. *Source*: derived, half way between one
-/// lost row and none.
+/// A step of time above this number of periods, jitter aside, has a row missing in it. *Source*: derived, half way
+/// between one lost row and none.
 const LOST_ROW_PERIODS: f64 = 1.5;
-/// Stamps on either side of such a step that show by how much later they are than before. *Guess*: few, so that they
-/// are of one period; of six a third may scatter.
-const AROUND_ROWS: usize = 6;
 /// Standard deviation of the median of many values over that of their mean: √(π/2) for normal ones. *Source*: derived.
 const MEDIAN_TO_MEAN_STD: f64 = 1.253;
 /// The median step is known to this number of its standard deviations. *Guess*: two hold in 95 % of the cases.
 const MEDIAN_STDS: f64 = 2.0;
-/// Where rows are missing in more steps than this share, they are not evenly spaced by intent, and none is missing.
-/// *Guess*: a logger loses fewer than one row in twenty.
+/// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing. *Guess*: a
+/// logger loses fewer than one row in twenty.
 const UNEVEN_SHARE: f64 = 0.05;
 /// Where more steps than this are zero, the clock is coarse; where fewer, rows are repeated. *Guess*: a sound clock
 /// stands in no row, and one that is coarse in every other one or more.
@@ -39,14 +35,24 @@ const JITTER_OVER_MOTION: f64 = 5.0;
 const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
 /// Generator speeds that exist, up to 20 000 turns a minute, rad/s. *Guess*: motors of such drives turn no faster.
 const FASTEST_RAD_S: f64 = 2100.0;
-/// Rows farther apart than this (s), for longer than this altogether (s), in which a motor that goes to and fro stays
-/// slower than this (rad/s), are milliseconds read as seconds: a telescope creeps for nights, but one way. *Guess*.
-const CREEPS: (f64, f64, f64) = (0.9, 3600.0, 0.15);
+/// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this
+/// (rad/s), may be milliseconds read as seconds: a bench creeps for minutes, not for days. *Guess*.
+const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
+/// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
+const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
 /// It goes to and fro where each direction has this share of the way, and this way at least, rad. *Guess*: one motor
 /// turn.
 const EACH_WAY: (f64, f64) = (0.1, 6.0);
 /// And never changes its pace by more than this share of its fastest one from row to row. *Guess*.
 const SMOOTHLY: f64 = 0.35;
+/// A loop follows the clock: its phase takes this share of the distance of a stamp from where it is expected. *Guess*:
+/// it averages some forty stamps.
+const PHASE_GAIN: f64 = 0.05;
+/// The period of the loop takes this share of that distance. *Source*: derived, the loop is then damped by 1/√2 of
+/// critical.
+const PERIOD_GAIN: f64 = 0.5 * PHASE_GAIN * PHASE_GAIN;
+/// Rows on either side by which a row is assigned to its period. *Guess*: few, so that a lost row stays where it is.
+const AROUND_ROWS: usize = 5;
 
 /// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
 ///
@@ -60,20 +66,17 @@ pub(in crate::measurement) fn check(
     if log.get(Quantity::Time).is_none() {
         return Ok(());
     }
-    let known = period(log).map(|at_first| {
-        order(log, at_first, findings);
-        standing(log, findings);
-        period(log).unwrap_or(at_first)
-    });
-    let Some(period) = known else {
+    let strays = order(log, findings);
+    standing(log, findings);
+    let Some(period) = period(log) else {
         let all = log.fault(FaultName::ClockError, 0..log.len());
         let all = all.map(|all| Fault { time_s: None, until_s: None, ..all });
         findings.add(all, Quantity::Time, Treatment::Masked, |_| "time stands still: it is not used".to_owned());
         log.take(Quantity::Time);
         return Ok(());
     };
-    let lost = gaps(log, period, findings);
-    jitter(log, period, &lost, findings);
+    gaps(log, period, &strays, findings);
+    jitter(log, period, findings);
     scale(log, period, columns, findings)
 }
 
@@ -84,9 +87,11 @@ pub(super) fn period(log: &Log) -> Option<f64> {
     (!steps.is_empty()).then(|| median_of(&mut sampled(&steps)))
 }
 
-/// Time that runs back: a row out of order is left out, a clock that was set back starts a session.
-fn order(log: &mut Log, period: f64, findings: &mut Findings) {
-    let Some(time) = log.get(Quantity::Time) else { return };
+/// Time that runs back: a row out of order is left out, a clock that was set back starts a session. Gives the lines
+/// left out.
+fn order(log: &mut Log, findings: &mut Findings) -> Vec<u64> {
+    let Some(period) = period(log) else { return Vec::new() };
+    let Some(time) = log.get(Quantity::Time) else { return Vec::new() };
     let far = SESSION_GAP_PERIODS * period;
     let (mut latest, mut back) = (f64::NEG_INFINITY, 0.0);
     let (mut strays, mut resets) = (Vec::new(), Vec::new());
@@ -112,12 +117,17 @@ fn order(log: &mut Log, period: f64, findings: &mut Findings) {
     findings.add(reset, Quantity::Time, Treatment::Kept, |fault| {
         format!("time is set back {} times, first by {back:.4} s: a new session is begun there", fault.rows)
     });
+    let lines = strays.iter().map(|row| log.line[*row]).collect();
     log.begin_sessions(&resets);
     log.leave_out(&marked(log.len(), strays));
+    lines
 }
 
 /// Time that stands: rows that are repeated are left out, a coarse clock is spread.
 fn standing(log: &mut Log, findings: &mut Findings) {
+    if period(log).is_none() {
+        return;
+    }
     let Some(time) = log.get(Quantity::Time) else { return };
     let (rows, mut spread) = (time.len(), time.to_vec());
     let stands: Vec<usize> = (1..rows).filter(|row| time[*row] == time[*row - 1] && log.continues(*row)).collect();
@@ -151,34 +161,43 @@ fn turned(values: &[f64], row: usize) -> f64 {
     d - TAU * (d / TAU).round()
 }
 
-/// Gaps in time: sessions, and rows that were lost. Gives how many periods are missing before which rows.
-fn gaps(log: &mut Log, period: f64, findings: &mut Findings) -> Vec<(usize, u64)> {
-    let Some(time) = log.get(Quantity::Time) else { return Vec::new() };
-    let is_gap = |row: &usize| log.continues(*row) && time[*row] - time[*row - 1] > SESSION_GAP_PERIODS * period;
-    let parts: Vec<usize> = (1..time.len()).filter(is_gap).collect();
-    log.begin_sessions(&parts);
-    let lost = missing_before(log, period);
-    let Some(time) = log.get(Quantity::Time) else { return lost };
-    // The median step may be shorter than the period that a clock keeps on the mean: no more rows are missing than the
-    // time of a session leaves room for, as well as the median is known.
+/// Gaps in time: sessions, and rows that were lost. Near `strays`, lines left out for their time, none is counted as
+/// lost.
+fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
+    let Some(time) = log.get(Quantity::Time) else { return };
+    let rows = time.len();
     let mut steps = sampled(&time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect::<Vec<_>>());
     let jitter = median_and_std(&mut steps).1;
-    let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (time.len() as f64).sqrt();
-    let room = log.sessions().map(|rows| {
-        let (n, lasts_s) = (rows.len() as f64, time[rows.end - 1] - time[rows.start]);
-        (lasts_s / period - (n - 1.0) + unsure * n).max(0.0).round()
-    });
-    // Rows that are in the file, but were left out, are not lost.
-    let in_file = |row: usize| log.line[row] - log.line[row - 1] - 1;
-    let holes: Vec<(usize, u64)> =
-        lost.iter().map(|(row, rows)| (*row, rows.saturating_sub(in_file(*row)))).filter(|hole| hole.1 > 0).collect();
-    let total = holes.iter().map(|(_, rows)| *rows).sum::<u64>().min(room.sum::<f64>() as u64);
-    let places = holes.len().min(total as usize);
-    if total > 0 && holes.len() as f64 > UNEVEN_SHARE * time.len() as f64 {
-        let steps = holes.len();
-        findings.notes.push(format!("rows are not evenly spaced in time: {steps} steps exceed {:.6} s", 1.5 * period));
+    let lost_from = (LOST_ROW_PERIODS * period).max(period + 6.0 * jitter);
+    let long: Vec<usize> =
+        (1..rows).filter(|row| log.continues(*row) && time[*row] - time[*row - 1] > lost_from).collect();
+    let parts: Vec<usize> =
+        long.iter().copied().filter(|row| time[*row] - time[*row - 1] > SESSION_GAP_PERIODS * period).collect();
+    log.begin_sessions(&parts);
+    let Some(time) = log.get(Quantity::Time) else { return };
+    // The median step may be shorter than the period that a clock keeps on the mean: no more rows are missing than the
+    // time of a session leaves room for, as well as the median is known.
+    let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (rows as f64).sqrt();
+    let mut room = 0.0;
+    let mut lost: Vec<(usize, u64)> = Vec::new();
+    for Counted { rows, period: periods } in counted(log, period) {
+        let n = rows.len() as f64;
+        room += ((time[rows.end - 1] - time[rows.start]) / period - (n - 1.0) + unsure * n).max(0.0).round();
+        for (k, row) in rows.enumerate().skip(1) {
+            // Rows that are in the file, but were left out, are not lost.
+            let beyond = (periods[k] - periods[k - 1]).saturating_sub(log.line[row] - log.line[row - 1]);
+            if beyond > 0 && !strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2) {
+                lost.push((row, beyond));
+            }
+        }
+    }
+    let total = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(room as u64);
+    let places = lost.len().min(total as usize);
+    if total > 0 && long.len() as f64 > UNEVEN_SHARE * rows as f64 {
+        let uneven = format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", long.len());
+        findings.notes.push(uneven);
     } else if total > 0 {
-        let fault = log.fault(FaultName::MissingSamples, holes.iter().map(|(row, _)| *row));
+        let fault = log.fault(FaultName::MissingSamples, lost.iter().map(|(row, _)| *row));
         let fault = fault.map(|fault| Fault { rows: total, ..fault });
         findings.add(fault, Quantity::Time, Treatment::Kept, |_| {
             format!(
@@ -186,32 +205,43 @@ fn gaps(log: &mut Log, period: f64, findings: &mut Findings) -> Vec<(usize, u64)
             )
         });
     }
-    lost
 }
 
-/// How many periods are missing before which rows: those that the step of the stamp counts, but no more than the stamps
-/// after it are later than those before it, as one stamp may be late by itself.
-fn missing_before(log: &Log, period: f64) -> Vec<(usize, u64)> {
+/// The rows of a session by the periods that its stamps count.
+struct Counted {
+    rows: std::ops::Range<usize>,
+    /// Period that each row belongs to, from 0; each row has one of its own.
+    period: Vec<u64>,
+}
+
+/// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up.
+/// A stamp that scatters into a period next to its own is counted with its neighbours.
+fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
     let time = log.get(Quantity::Time).unwrap_or_default();
-    let mut found = Vec::new();
-    for rows in log.sessions() {
-        let late =
-            |rows: Range<usize>| median_of(&mut rows.map(|row| time[row] / period - row as f64).collect::<Vec<f64>>());
+    log.sessions().map(move |rows| {
+        let (mut expected, mut step_s, mut count) = (time[rows.start], period_s, 0.0);
+        // Periods beyond those of the rows.
+        let mut beyond = vec![0.0];
         for row in rows.start + 1..rows.end {
-            let step = (time[row] - time[row - 1]) / period;
-            if step > LOST_ROW_PERIODS {
-                let after = late(row..(row + AROUND_ROWS).min(rows.end));
-                let before = late(row.saturating_sub(AROUND_ROWS).max(rows.start)..row);
-                let periods = (step.round() - 1.0).min((after - before).round());
-                found.extend((periods > 0.0).then_some((row, periods as u64)));
-            }
+            let steps = ((time[row] - expected) / step_s).round().max(0.0);
+            count += steps;
+            let off = time[row] - expected - steps * step_s;
+            expected += steps * step_s + PHASE_GAIN * off;
+            step_s = (step_s + PERIOD_GAIN * off / steps.max(1.0)).clamp(0.9 * period_s, 1.1 * period_s);
+            beyond.push(count - (row - rows.start) as f64);
         }
-    }
-    found
+        let mut most = 0.0f64;
+        let around = |k: usize| beyond[k.saturating_sub(AROUND_ROWS)..(k + AROUND_ROWS + 1).min(beyond.len())].to_vec();
+        let period = (0..rows.len()).map(|k| {
+            most = most.max(median_of(&mut around(k)));
+            k as u64 + most as u64
+        });
+        Counted { period: period.collect(), rows }
+    })
 }
 
-/// Stamps that scatter while the motion from row to row does not: each row gets a period, and those `lost` one as well.
-fn jitter(log: &mut Log, period: f64, lost: &[(usize, u64)], findings: &mut Findings) {
+/// Stamps that scatter while the motion from row to row does not.
+fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
     let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return };
     let (mut of_time, mut of_motion) = (Vec::new(), Vec::new());
     for row in 2..time.len() {
@@ -240,14 +270,14 @@ fn jitter(log: &mut Log, period: f64, lost: &[(usize, u64)], findings: &mut Find
             100.0 * motion_scatter
         )
     });
-    let sessions: Vec<Range<usize>> = log.sessions().collect();
-    let mut periods: Vec<f64> = (0..log.len()).map(|row| row as f64).collect();
-    add_steps(&mut periods, &lost.iter().map(|(row, lost)| (*row, *lost as f64)).collect::<Vec<_>>(), 1.0);
+    let sessions: Vec<Counted> = counted(log, period).collect();
     let Some(time) = log.get_mut(Quantity::Time) else { return };
-    for rows in sessions {
+    for Counted { rows, period } in sessions {
         let (from, to) = (time[rows.start], time[rows.end - 1]);
-        let last = (periods[rows.end - 1] - periods[rows.start]).max(1.0);
-        rows.clone().for_each(|row| time[row] = from + (to - from) * (periods[row] - periods[rows.start]) / last);
+        let last = period[period.len() - 1].max(1) as f64;
+        for (row, period) in rows.zip(period) {
+            time[row] = from + (to - from) * period as f64 / last;
+        }
     }
 }
 
@@ -262,18 +292,16 @@ fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findin
     let (speed, fastest) = (median_of(&mut speeds), quantile_of(&mut speeds, 0.95));
     let lasts_s = period * time.len() as f64;
     let column = columns.iter().find(|column| column.quantity == Quantity::Time && !column.said);
-    let slower = period > CREEPS.0 && lasts_s > CREEPS.1 && fastest < CREEPS.2;
-    let way = |sign: f64| {
-        let rows = (1..time.len()).filter(|row| log.continues(*row));
-        rows.map(|row| (sign * turned(generator, row)).max(0.0)).sum::<f64>()
-    };
+    let slower = |limits: (f64, f64, f64)| period > limits.0 && lasts_s > limits.1 && fastest < limits.2;
+    let moves = || (1..time.len()).filter(|row| log.continues(*row)).map(|row| turned(generator, row));
+    let way = |sign: f64| moves().map(|by| (sign * by).max(0.0)).sum::<f64>();
     let (there, back) = (way(1.0), way(-1.0));
     let to_and_fro = there.min(back) > EACH_WAY.1.max(EACH_WAY.0 * (there + back));
     // A motor that creeps starts and turns round within a row; one that takes many rows to do so is a fast one.
     let changes = (2..time.len()).filter(|row| log.continues(*row) && log.continues(row - 1));
     let change = changes.map(|row| (turned(generator, row) - turned(generator, row - 1)).abs()).fold(0.0, f64::max);
     let smoothly = change < SMOOTHLY * fastest * period;
-    if let Some(column) = column.filter(|_| slower && to_and_fro && smoothly) {
+    if let Some(column) = column.filter(|_| to_and_fro && smoothly && slower(CREEPS_TO_AND_FRO)) {
         let (column, rows, hours) = (column.name.clone(), time.len(), lasts_s / 3600.0);
         return Err(Refusal::Milliseconds { column, rows, period, hours, speed: fastest });
     }
@@ -281,6 +309,8 @@ fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findin
         format!("a sample period of {period:e} s is not plausible")
     } else if speed > FASTEST_RAD_S {
         format!("a generator speed of {speed:.0} rad/s is not plausible")
+    } else if column.is_some() && slower(CREEPS) {
+        format!("{} rows {period:.3} s apart, in which the generator hardly exceeds {fastest:.3} rad/s", time.len())
     } else {
         return Ok(());
     };
