@@ -314,8 +314,8 @@ struct Mending {
 }
 
 impl Mending {
-    /// From the sum that is wanted and the one that was found. Where neighbouring bits of the sum itself changed no word
-    /// is missed.
+    /// From the sum that is wanted and the one that was found. Where neighbouring bits of the sum itself changed, no
+    /// word is missed.
     #[inline(never)]
     fn new(wanted: u64, found: u64) -> Self {
         let (one, other) = (reduced(wanted), reduced(found));

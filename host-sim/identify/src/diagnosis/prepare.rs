@@ -298,8 +298,8 @@ pub(crate) struct FreeColumns {
 }
 
 impl FreeColumns {
-    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on averages of `finest`
-    /// rows, if these hold for them.
+    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on averages of
+    /// `finest` rows, if these hold for them.
     #[must_use]
     pub fn of(on: &Excitation<'_>, laws: &[Law], finest: usize) -> FreeColumns {
         let averaged = Averaged::of(on, finest);

@@ -12,8 +12,8 @@ use super::select::{self, Selected, less};
 use super::thresholds::remainder::*;
 use crate::residual::strongest;
 
-/// Highest order per generator turn up to which lines are looked for. *Guess*: above what bearings make, below the tooth
-/// mesh of ratios above 75, which has models of its own.
+/// Highest order per generator turn up to which lines are looked for. *Guess*: above what bearings make, below the
+/// tooth mesh of ratios above 75, which has models of its own.
 const HIGHEST_ORDER: f64 = 150.0;
 /// A line is looked at from this share of the least size that counts on. *Guess*.
 const LEAST_OF_A_SIZE: f64 = 0.25;

@@ -83,7 +83,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
 }
 
 /// Runs of one value of a channel in a session.
-type Runs = Vec<Range<usize>>;
+pub(super) type Runs = Vec<Range<usize>>;
 
 /// Runs of one value, but for round-off.
 fn runs_of(values: &[f64]) -> Runs {
@@ -116,7 +116,7 @@ fn counts(angle: &[f64], runs: &[Range<usize>]) -> bool {
 
 /// Whether the error goes on from run to run, instead of changing with the torque within a row. Where the torque
 /// changes its sign the flank does, and those do not count.
-fn goes_on_between(sessions: &[Session], of: &[Runs]) -> bool {
+pub(super) fn goes_on_between(sessions: &[Session], of: &[Runs]) -> bool {
     let (mut within, mut in_all) = (0.0, 0.0);
     for (session, runs) in sessions.iter().zip(of) {
         let (torque, error) = (session.torque_n_m.as_deref().unwrap_or_default(), &session.error_rad);
