@@ -301,7 +301,7 @@ pub(crate) fn parse_at_least(
     }
     faults::held::check(&mut sessions, gear, &mut findings);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
-    faults::resolution::check_torque(&mut sessions, &mut findings);
+    faults::coarse_torque::check(&mut sessions, &mut findings);
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);

@@ -32,6 +32,7 @@
 //! | coarse resolution of an angle or of the torque, implausible time | named |
 
 pub(super) mod clock;
+pub(super) mod coarse_torque;
 pub(super) mod drift;
 pub(super) mod frozen;
 pub(super) mod held;

@@ -204,9 +204,10 @@ impl Jitter {
             })
         };
         let (noise, both) = (fit(1)?, fit(2)?);
-        let [at_rest, at_speed] = [0, 1].map(|k| both.values()[k].max(0.0).sqrt());
+        // A variance below zero at rest is of something else that grows with the speed.
+        let [at_rest, at_speed] = [0, 1].map(|k| both.values()[k].sqrt());
         let jitter = Jitter { noise: at_rest, rows: at_speed / fast };
-        let certain = noise.misfit() - both.misfit() > CERTAIN;
+        let certain = at_rest >= 0.0 && noise.misfit() - both.misfit() > CERTAIN;
         (certain && jitter.matters(fast) && is_white(reads, fast)).then_some(jitter)
     }
 }

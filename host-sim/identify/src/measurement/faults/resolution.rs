@@ -1,12 +1,7 @@
 //! A resolution so coarse that no noise blurs it.
 
-use std::collections::HashSet;
-use std::ops::Range;
-
-use super::held::{Runs, goes_on_between};
 use super::lattice::lattice;
-use super::steps::largest_torque;
-use super::{ARCSEC, Findings, runs, throughout};
+use super::{ARCSEC, Findings, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Treatment};
@@ -33,17 +28,6 @@ const ROUNDED: f64 = 0.1;
 /// Rows from one reading to another. At a speed that is nearly a whole number of steps to a row the next one is rounded
 /// by just about as much, and a later one is not. *Guess*: octaves, of which one is not near a whole number.
 const APART: [usize; 4] = [1, 2, 4, 8];
-
-/// Steps of a torque of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
-const LEAST_STEP: f64 = 0.004;
-/// Steps are those of a sensor, and not weights that somebody put on and wrote down, if there are this many of them, …
-/// *Guess*: nobody writes down as many weights.
-const MANY_STEPS: usize = 12;
-/// … and this share of the runs of one value is shorter than [`TORN_ROWS`] or goes on to the next step. *Guess*:
-/// weights that are put on by hand are neither.
-const TORN: f64 = 0.2;
-/// Rows of a run that noise or a change has torn, less than. *Guess*: no weight is put on for so short.
-const TORN_ROWS: usize = 3;
 
 /// Resolutions that show in the data, in rad at the output.
 pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
@@ -115,59 +99,6 @@ pub(in crate::measurement) fn check(
     sessions.iter_mut().for_each(|session| session.coarse_rad = coarsest);
 }
 
-/// Names a torque that a sensor writes in steps that matter. Where the load goes on between them a curve takes their
-/// place (cubic, with the slopes of the steps around): from one step to the next the load is halfway. Steps of weights
-/// that are put on are the load itself.
-pub(in crate::measurement) fn check_torque(sessions: &mut [Session], findings: &mut Findings) {
-    let torque_of = |session: &Session| session.torque_n_m.clone().unwrap_or_default();
-    let torques: Vec<Vec<f64>> = sessions.iter().map(torque_of).collect();
-    // A session of few loads shows a multiple of the step.
-    let Some(step) = torques.iter().filter_map(|torque| lattice(torque)).min_by(f64::total_cmp) else { return };
-    let steps: HashSet<i64> = torques.iter().flatten().map(|torque| (torque / step).round() as i64).collect();
-    if step < LEAST_STEP * largest_torque(sessions) || steps.len() < MANY_STEPS {
-        return;
-    }
-    let of: Vec<Runs> = torques.iter().map(|torque| runs(torque, |a, b| a == b)).collect();
-    let by_one = |a: f64, b: f64| (b - a).abs() < 1.5 * step;
-    let (mut count, mut torn) = (0, 0);
-    for (torque, runs) in torques.iter().zip(&of) {
-        for pair in runs.windows(2) {
-            count += 1;
-            torn += usize::from(by_one(torque[pair[0].start], torque[pair[1].start]) || pair[0].len() < TORN_ROWS);
-        }
-    }
-    let fault = throughout(sessions, FaultName::Quantisation).filter(|_| torn as f64 >= TORN * f64::from(count));
-    let goes_on = fault.is_some() && goes_on_between(sessions, &of);
-    let (treatment, between) = if goes_on {
-        (Treatment::Repaired, "the load goes on between them: a curve from one change to the next stands in")
-    } else {
-        (Treatment::Kept, "what the load does within a step is not seen")
-    };
-    findings.add(fault, Quantity::Torque, treatment, |_| {
-        format!("the torque is written in steps of {step:.3} N·m: {between}")
-    });
-    for (session, (written, runs)) in sessions.iter_mut().zip(torques.iter().zip(&of)).filter(|_| goes_on) {
-        let Some(torque) = &mut session.torque_n_m else { continue };
-        for near in runs.windows(3) {
-            let [before, here, after] = [0, 1, 2].map(|k| written[near[k].start]);
-            let end = |other: f64| if by_one(here, other) { 0.5 * (here + other) } else { here };
-            let rows = near[1].len() as f64;
-            let rise = |other: &Range<usize>, by: f64| {
-                if by_one(0.0, by) { by / (0.5 * (rows + other.len() as f64)) } else { 0.0 }
-            };
-            let (from, to) = (end(before), end(after));
-            let (leaves, arrives) = (rise(&near[0], here - before), rise(&near[2], after - here));
-            for (k, torque) in torque[near[1].clone()].iter_mut().enumerate() {
-                let share = (k as f64 + 0.5) / rows;
-                let rest = 1.0 - share;
-                let curve = rest * rest * (from + share * (2.0 * from + rows * leaves))
-                    + share * share * (to + rest * (2.0 * to - rows * arrives));
-                *torque = curve.clamp(here - 0.5 * step, here + 0.5 * step);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,53 +148,5 @@ mod tests {
         // Steps of 0.1 rad of the generator are 206 arcsec at the output.
         let found = of_generator(session(6000, |k| 0.037 * k, |psi| 0.1 * (psi / 0.1).floor()));
         assert!((found.expect("coarse") * RATIO - 0.1).abs() < 1e-3, "{found:?}");
-    }
-
-    #[test]
-    fn steps_of_a_sensor_are_named_and_weights_are_not() {
-        let mut random = fastrand::Rng::with_seed(2);
-        let levels: Vec<f64> = (0..60).map(|_| 25.0 * (2.0 * random.f64() - 1.0)).collect();
-        let named = |step: f64, load: &dyn Fn(f64) -> f64| {
-            let written = (0..6000).map(|k| (load(0.01 * f64::from(k)) / step).round() * step).collect();
-            let generator_rad = (0..6000).map(|k| 0.04 * f64::from(k)).collect();
-            let (line, error_rad) = ((2..6002).collect(), vec![0.0; 6000]);
-            let session = Session { line, generator_rad, error_rad, torque_n_m: Some(written), ..Session::default() };
-            let mut findings = Findings::default();
-            check_torque(&mut [session], &mut findings);
-            findings.faults.pop().map(|fault| (fault.name, fault.channel, fault.treatment))
-        };
-        let quantisation = Some((FaultName::Quantisation, Some(Quantity::Torque), Treatment::Kept));
-        // Put on within three rows.
-        let put_on = |t: f64| {
-            let (at, since) = ((t as usize).min(58), (t.fract() / 0.03).min(1.0));
-            levels[at] + since * (levels[at + 1] - levels[at])
-        };
-        assert_eq!(named(1.0, &put_on), quantisation);
-        assert_eq!(named(1.0, &|t| levels[(t as usize).min(59)]), None);
-        let swings = |t: f64| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
-        assert_eq!(named(5.0, &swings), quantisation);
-        // Digits are no steps.
-        assert_eq!(named(1e-3, &swings), None);
-    }
-
-    #[test]
-    fn a_load_that_goes_on_between_steps_is_read_off() {
-        let load = |t: f64| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
-        let times = || (0..6000).map(|k| 0.01 * f64::from(k));
-        // 30 µrad per N·m.
-        let mut sessions = [Session {
-            line: (2..6002).collect(),
-            generator_rad: times().map(|t| 4.0 * t).collect(),
-            error_rad: times().map(|t| 3e-5 * load(t)).collect(),
-            torque_n_m: Some(times().map(|t| (load(t) / 2.5).round() * 2.5).collect()),
-            ..Session::default()
-        }];
-        let mut findings = Findings::default();
-        check_torque(&mut sessions, &mut findings);
-        assert_eq!(findings.faults.pop().expect("a fault").treatment, Treatment::Repaired);
-        let torque = sessions[0].torque_n_m.as_ref().unwrap();
-        let rms = (times().zip(torque).map(|(t, of)| (of - load(t)).powi(2)).sum::<f64>() / 6000.0).sqrt();
-        // Rounding leaves 2.5/√12 = 0.72.
-        assert!(rms < 0.36, "{rms}");
     }
 }
