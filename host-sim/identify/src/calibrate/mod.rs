@@ -53,6 +53,11 @@ const FEWEST_ROWS: usize = 64;
 /// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load
 /// of interest.
 const LEAST_FRICTION: f64 = 0.02;
+/// Rows between two dead zones tell them apart if their load is clear of both by this multiple of the torque's noise…
+const CLEAR_OF_NOISE: f64 = 6.0;
+/// …and if the other leaves less than this share of their squares: where it is right, half of them lie on the wrong
+/// flank.
+const OTHER_DEAD_ZONE: f64 = 0.8;
 /// Torques within this share of the largest are one.
 const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
@@ -473,9 +478,10 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         rows = settled(files, prior, &recorded);
     }
     let at_one_instant = at_one_instant.as_deref().unwrap_or(files);
-    // A load in the dead zone of a table decides no flank.
-    let own_n_m = prior.table.map_or(0.0, dead_zone_n_m);
-    recorded.scales.friction_n_m = recorded.scales.friction_n_m.max(own_n_m);
+    if let Some(table) = prior.table {
+        recorded.scales.friction_n_m = dead_zone(&rows, prior, table, &recorded);
+    }
+    rows = rows.sure(recorded.scales.friction_n_m, &recorded);
     let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
     let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
     let friction_n_m = recorded.scales.friction_n_m;
@@ -635,6 +641,27 @@ fn with_faults(error: CalibrationError, files: &[Recording], said: &[String]) ->
         CalibrationError::NothingGained(error) => CalibrationError::NothingGained(after(error, said)),
         other => other,
     }
+}
+
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, unless rows with loads
+/// between it and that of a drive with the usual friction say otherwise.
+fn dead_zone(rows: &Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> f64 {
+    let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
+    if own <= 0.0 || own >= usual {
+        return own.max(usual);
+    }
+    // A row on a flank that the noise of its torque has drawn would move the mean of its file, and with it all others.
+    let sure = rows.clone().sure(own, recorded).sure(usual, recorded);
+    let noise = CLEAR_OF_NOISE * recorded.torque_noise_n_m;
+    let between = own + noise..usual - noise;
+    let left = |least_friction_n_m: f64| -> Vec<f64> {
+        let rows = sure.clone().less(&Prior { least_friction_n_m, ..prior.clone() }).rows.into_iter();
+        rows.filter(|row| between.contains(&row.at.torque_n_m.abs())).map(|row| row.left_arcsec.powi(2)).collect()
+    };
+    let (by_own, by_usual) = (left(own), left(usual));
+    let other =
+        by_own.len() >= FEWEST_ROWS && by_usual.iter().sum::<f64>() < OTHER_DEAD_ZONE * by_own.iter().sum::<f64>();
+    if other { usual } else { own }
 }
 
 /// The zero of the output in each file.

@@ -6,7 +6,7 @@ use super::folds::{Folds, Row};
 use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State};
 use super::prior::Prior;
 use crate::least_squares::Normal;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns};
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -24,6 +24,9 @@ pub(super) const MOST_ROWS: usize = 40_000;
 const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by this multiple of the play.
 const SETTLED: f64 = 1.5;
+
+/// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it.
+const SURE: f64 = 3.0;
 
 /// How the folds were made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +62,8 @@ pub(super) struct Recorded {
     pub generator_turns: f64,
     /// Of the way of the generator, there and back.
     pub backward_share: f64,
+    /// Noise of the torque from row to row, N·m.
+    pub torque_noise_n_m: f64,
     /// Usual step of the generator, rad.
     pub step_rad: f64,
     /// Generator turns in steps that are short beside a tooth pitch.
@@ -124,7 +129,9 @@ impl Recorded {
         };
         let unrecorded = without_rows(angles(1.0 / prior.nominal.ratio), PARTS_OF_A_TURN);
         let output_share = share_with_rows(unrecorded, PARTS_OF_A_TURN);
+        let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
+            torque_noise_n_m,
             scales: Scales {
                 torque_n_m: if has_torque { [torque.0, torque.1] } else { [0.0; 2] },
                 friction_n_m: prior.friction_n_m().max(if has_torque { super::LEAST_FRICTION * most } else { 0.0 }),
@@ -349,6 +356,15 @@ impl Rows {
     /// Sums over their folds.
     pub(crate) fn folds_of(&self, parts: &[PartName], scales: &Scales) -> Folds {
         Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.folds == FoldKind::Files)
+    }
+
+    /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from
+    /// `friction_n_m` on decide it.
+    pub(crate) fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
+        let all = self.rows.len();
+        self.rows.retain(|row| (row.at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m);
+        self.unsettled += all - self.rows.len();
+        self
     }
 
     /// With what a prior says taken off what was measured, and the mean of each file off that.
