@@ -593,21 +593,28 @@ fn the_phase_of_a_table_is_found_from_a_log() {
     assert!(!told.told, "{told:?}");
 }
 
+/// An arm in one posture, whose load is a wave of the output, with the error that an output angle and a load make,
+/// arcsec.
+fn arm(error_arcsec: impl Fn(f64, f64) -> f64) -> Recording {
+    let mut log = recording(1, |_, _, _, _| 0.0);
+    let session = &mut log.sessions[0];
+    for k in 0..session.len() {
+        let out = session.generator_rad[k] / RATIO;
+        let torque = 25.0 * (out + 0.2).sin();
+        session.torque_n_m.as_mut().unwrap()[k] = torque;
+        session.error_rad[k] += error_arcsec(out, torque) / ARCSEC_PER_RAD;
+    }
+    log
+}
+
 /// An arm in one posture: its load is a wave of the output. Whichever of the two is kept, the interval holds what the
 /// other may be, and a note says so; over the states recorded the table is known.
 #[test]
 fn an_arm_in_one_posture_leaves_its_spring_in_the_interval() {
     for (wind_up, eccentric) in [(3.0, 0.0), (0.0, 60.0), (3.0, 60.0)] {
-        let mut log = recording(1, |_, _, _, _| 0.0);
+        let mut log =
+            arm(|out, torque| 15.0 * (2.0 * RATIO * out).sin() + eccentric * (out - 0.7).cos() + wind_up * torque);
         let session = &mut log.sessions[0];
-        for k in 0..session.len() {
-            let out = session.generator_rad[k] / RATIO;
-            let torque = 25.0 * (out + 0.2).sin();
-            session.torque_n_m.as_mut().unwrap()[k] = torque;
-            let psi = session.generator_rad[k];
-            let error = 15.0 * (2.0 * psi).sin() + eccentric * (out - 0.7).cos() + wind_up * torque;
-            session.error_rad[k] += error / ARCSEC_PER_RAD;
-        }
         let drop: Vec<bool> = session.generator_rad.iter().map(|psi| psi / RATIO > 3.0).collect();
         session.leave_out(&drop);
         let c = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap().calibration;
@@ -621,14 +628,7 @@ fn an_arm_in_one_posture_leaves_its_spring_in_the_interval() {
 /// table.
 #[test]
 fn a_model_that_is_far_too_soft_makes_a_table() {
-    let mut log = recording(1, |_, _, _, _| 0.0);
-    let session = &mut log.sessions[0];
-    for k in 0..session.len() {
-        let out = session.generator_rad[k] / RATIO;
-        let torque = 25.0 * (out + 0.2).sin();
-        session.torque_n_m.as_mut().unwrap()[k] = torque;
-        session.error_rad[k] += (60.0 * (out + 0.9).cos() + 3.0 * torque) / ARCSEC_PER_RAD;
-    }
+    let log = arm(|out, torque| 60.0 * (out + 0.9).cos() + 3.0 * torque);
     let mut prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
     prior.nominal.stiffness = vec![[0.0, 25_000.0]];
     let c = calibrate(&[log], &prior).map_err(|error| error.to_string()).unwrap().calibration;
