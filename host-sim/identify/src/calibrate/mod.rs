@@ -54,9 +54,10 @@ const FEWEST_ROWS: usize = 64;
 /// of interest.
 const LEAST_FRICTION: f64 = 0.02;
 /// Rows between two dead zones tell them apart if their load is clear of both by this multiple of the torque's noise…
+/// *Guess*.
 const CLEAR_OF_NOISE: f64 = 6.0;
-/// …and if the other leaves less than this share of their squares: where it is right, half of them lie on the wrong
-/// flank.
+/// …and if the other leaves less than this share of their squares. *Guess*: where it is right, half of them lie on the
+/// wrong flank.
 const OTHER_DEAD_ZONE: f64 = 0.8;
 /// Torques within this share of the largest are one.
 const SAME_TORQUE: f64 = 1e-3;

@@ -25,7 +25,7 @@ const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by this multiple of the play.
 const SETTLED: f64 = 1.5;
 
-/// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it.
+/// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it. *Guess*.
 const SURE: f64 = 3.0;
 
 /// How the folds were made.
