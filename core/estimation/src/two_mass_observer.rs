@@ -410,10 +410,9 @@ impl TwoMassObserver {
     fn model(&self) -> Option<TwoMassModel> {
         let (StepModel { a, b, gain }, AheadModel { turn, turn_push, stiffness }) =
             (self.step.open()?, self.ahead.open()?);
-        let (a, b) = (a.insert_row(3, 0.0), b.push(0.0));
-        let mut model = TwoMassModel { a, b, gain, turn: turn.into(), turn_push, stiffness };
-        model.a.set_row(3, &LOAD_STAYS.into());
-        Some(model)
+        let mut whole = Matrix4::from_rows(&[LOAD_STAYS.into(); 4]);
+        whole.fixed_rows_mut::<3>(0).copy_from(&a);
+        Some(TwoMassModel { a: whole, b: b.push(0.0), gain, turn: turn.into(), turn_push, stiffness })
     }
 
     /// All numbers of a predictor, for the image of the firmware: the matrices by columns, what the load turns in a
@@ -705,7 +704,7 @@ impl TwoMassModel {
         if a.row(3) != RowVector4::from(LOAD_STAYS) || b.w != 0.0 {
             return Err(PredictorError::Load);
         }
-        let step = StepModel { a: a.remove_row(3), b: b.xyz(), gain };
+        let step = StepModel { a: a.fixed_rows::<3>(0).into_owned(), b: b.xyz(), gain };
         let ahead = AheadModel { turn: turn.transpose().into(), turn_push, stiffness };
         Ok(TwoMassObserver { step: Sealed::new(step), ahead: Sealed::new(ahead) })
     }

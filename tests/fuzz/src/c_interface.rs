@@ -807,10 +807,13 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
 
 /// Numbers of a predictor.
 static PARTS: std::sync::LazyLock<[f32; c::FLEXSPLINE_PREDICTOR_PARTS]> = std::sync::LazyLock::new(|| {
-    // To find gains takes too long in an interpreter: there one whose state halves in a tick.
+    // To find gains takes too long in an interpreter: there one whose state halves in a tick, but for the torque on the
+    // load, which stays, is seen in the twist and corrected by it.
     if cfg!(miri) {
         let mut parts = [0.0; c::FLEXSPLINE_PREDICTOR_PARTS];
-        [0, 5, 10, 15].iter().for_each(|place| parts[*place] = 0.5);
+        let (twist_by_load, load_stays, load_by_twist) = (12, 15, 27);
+        [0, 5, 10, load_by_twist].iter().for_each(|place| parts[*place] = 0.5);
+        [twist_by_load, load_stays].iter().for_each(|place| parts[*place] = 1.0);
         parts[c::FLEXSPLINE_PREDICTOR_PARTS - 1] = 3e4;
         return parts;
     }
