@@ -101,7 +101,7 @@ impl Mesh {
         let mut force = vec![0.0; pattern.unknowns()];
         for (e, nodes) in self.elements.iter().enumerate() {
             let packed = linear_stiffness(&self.gauss[e], &steel());
-            pattern.element(&nodes.map(|n| index[n as usize])).scatter(&packed, &mut values);
+            pattern.positions(&nodes.map(|n| index[n as usize])).scatter(&packed, &mut values);
             let local = self.local(e, &u);
             for i in 0..16 {
                 let Some(row) = index[nodes[i / 2] as usize] else { continue };

@@ -9,4 +9,4 @@ mod pattern;
 
 pub use border::{Border, BorderedSystem, Factor};
 pub use cholesky::Cholesky;
-pub use pattern::{BlockPosition, ElementPositions, Pattern};
+pub use pattern::{PackedPositions, Pattern};

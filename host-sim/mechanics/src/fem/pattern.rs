@@ -1,54 +1,19 @@
 //! Sparsity pattern of a symmetric matrix whose unknowns come in pairs (x and y of a node), lower triangle by columns.
 
-/// Where the 2 x 2 block of a node pair (a, b) lies among the values: entry (i, j) is at `base + i * row + j * column`,
-/// i counting components of a, j of b.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BlockPosition {
-    /// Position of entry (0, 0).
-    pub base: u32,
-    /// Step to the next component of a.
-    pub row: u32,
-    /// Step to the next component of b.
-    pub column: u32,
-}
+/// Position of an entry that the matrix does not store.
+const ABSENT: u32 = u32::MAX;
 
-impl BlockPosition {
-    /// Adds the entries of a block to the values.
-    #[inline]
-    pub(crate) fn add(&self, entry: impl Fn(usize, usize) -> f64, values: &mut [f64]) {
-        for i in 0..2 {
-            for j in 0..2 {
-                values[self.base as usize + i * self.row as usize + j * self.column as usize] += entry(i, j);
-            }
-        }
-    }
-}
-
-/// Positions of an 8-node element: for nodes `a > b` the block at `a (a-1)/2 + b`, for each node its diagonal block as
-/// positions of (x, x), (y, x), (y, y). Blocks of fixed nodes are absent.
+/// Positions of the lower triangle over some nodes, packed by rows (see [`crate::fem::element`]). Entries of fixed
+/// nodes and of nodes that do not couple are absent.
 #[derive(Debug, Clone)]
-pub struct ElementPositions {
-    off_diagonal: [Option<BlockPosition>; 28],
-    diagonal: [Option<[u32; 2]>; 8],
-}
+pub struct PackedPositions(Vec<u32>);
 
-impl ElementPositions {
-    /// Adds a packed lower triangle (see [`crate::fem::element`]) to the values.
+impl PackedPositions {
+    /// Adds a packed lower triangle to the values.
     #[inline]
-    pub fn scatter(&self, packed: &[f64; crate::fem::element::PACKED], values: &mut [f64]) {
-        for a in 0..8 {
-            let row_x = a * (2 * a + 1);
-            let row_y = row_x + 2 * a + 1;
-            for b in 0..a {
-                if let Some(p) = self.off_diagonal[a * (a - 1) / 2 + b] {
-                    p.add(|i, j| packed[[row_x, row_y][i] + 2 * b + j], values);
-                }
-            }
-            if let Some([xx, yy]) = self.diagonal[a] {
-                values[xx as usize] += packed[row_x + 2 * a];
-                values[xx as usize + 1] += packed[row_y + 2 * a];
-                values[yy as usize] += packed[row_y + 2 * a + 1];
-            }
+    pub fn scatter<'a>(&self, packed: impl IntoIterator<Item = &'a f64>, values: &mut [f64]) {
+        for (position, entry) in self.0.iter().zip(packed).filter(|(position, _)| **position != ABSENT) {
+            values[*position as usize] += entry;
         }
     }
 }
@@ -56,11 +21,9 @@ impl ElementPositions {
 /// Lower-triangular pattern in compressed columns; node n has the unknowns 2n and 2n+1.
 #[derive(Debug, Clone)]
 pub struct Pattern {
-    /// Later neighbours of each node, ascending.
-    neighbours: Vec<Vec<u32>>,
     /// Start of each column among the values.
     pub column_starts: Vec<u32>,
-    /// Row of each value.
+    /// Row of each value, ascending in a column.
     pub rows: Vec<u32>,
 }
 
@@ -108,7 +71,7 @@ impl Pattern {
             rows.extend(list.iter().flat_map(|&n| [2 * n, 2 * n + 1]));
         }
         column_starts.push(rows.len() as u32);
-        Pattern { neighbours, column_starts, rows }
+        Pattern { column_starts, rows }
     }
 
     /// Number of unknowns.
@@ -121,41 +84,20 @@ impl Pattern {
         self.rows.len()
     }
 
-    /// Block of two different nodes, if they couple.
-    pub(crate) fn block(&self, a: u32, b: u32) -> Option<BlockPosition> {
-        let (low, high) = if a < b { (a, b) } else { (b, a) };
-        let k = self.neighbours[low as usize].binary_search(&high).ok()? as u32;
-        let first = self.column_starts[2 * low as usize] + 2 + 2 * k;
-        let second = self.column_starts[2 * low as usize + 1] + 1 + 2 * k;
-        let across = second - first;
-        Some(if a > b {
-            BlockPosition { base: first, row: 1, column: across }
-        } else {
-            BlockPosition { base: first, row: across, column: 1 }
-        })
+    /// Position of the entry of two unknowns, if the matrix stores it.
+    fn position(&self, a: u32, b: u32) -> Option<u32> {
+        let (row, column) = (a.max(b), a.min(b) as usize);
+        let start = self.column_starts[column] as usize;
+        let below = self.rows[start..self.column_starts[column + 1] as usize].binary_search(&row).ok()?;
+        Some((start + below) as u32)
     }
 
-    /// Positions of (x, x) and (y, y) of a node; (y, x) follows (x, x).
-    pub(crate) fn diagonal(&self, node: u32) -> [u32; 2] {
-        [self.column_starts[2 * node as usize], self.column_starts[2 * node as usize + 1]]
-    }
-
-    /// Positions of an element given by its nodes; `None` marks a fixed node.
-    ///
-    /// # Panics
-    /// When the element was not among the groups of the pattern.
-    pub fn element(&self, nodes: &[Option<u32>; 8]) -> ElementPositions {
-        let mut positions = ElementPositions { off_diagonal: [None; 28], diagonal: [None; 8] };
-        for a in 0..8 {
-            positions.diagonal[a] = nodes[a].map(|n| self.diagonal(n));
-            for b in 0..a {
-                if let (Some(na), Some(nb)) = (nodes[a], nodes[b]) {
-                    positions.off_diagonal[a * (a - 1) / 2 + b] =
-                        Some(self.block(na, nb).expect("element nodes are in the pattern"));
-                }
-            }
-        }
-        positions
+    /// Positions of the lower triangle over these nodes; `None` marks a fixed node.
+    pub fn positions(&self, nodes: &[Option<u32>]) -> PackedPositions {
+        let unknowns: Vec<Option<u32>> = nodes.iter().flat_map(|n| [n.map(|n| 2 * n), n.map(|n| 2 * n + 1)]).collect();
+        let entry = |a: Option<u32>, b: Option<u32>| self.position(a?, b?);
+        let pairs = unknowns.iter().enumerate().flat_map(|(i, a)| unknowns[..=i].iter().map(move |b| (*a, *b)));
+        PackedPositions(pairs.map(|(a, b)| entry(a, b).unwrap_or(ABSENT)).collect())
     }
 
     /// `y += A x` for the symmetric matrix with these values.
@@ -178,25 +120,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_address_the_lower_triangle() {
+    fn positions_address_the_lower_triangle() {
         let groups: Vec<Vec<u32>> = vec![vec![0, 2, 1], vec![2, 3]];
         let pattern = Pattern::new(4, groups.iter().map(Vec::as_slice), std::iter::empty());
         assert_eq!(pattern.unknowns(), 8);
-        assert!(pattern.block(0, 3).is_none());
+        assert!(pattern.position(1, 6).is_none());
         let entry = |position: u32| {
             let column = pattern.column_starts.partition_point(|&s| s <= position) - 1;
             (pattern.rows[position as usize], column as u32)
         };
-        for (a, b) in [(0, 1), (1, 0), (2, 0), (2, 3), (3, 2)] {
-            let p = pattern.block(a, b).unwrap();
-            for i in 0..2 {
-                for j in 0..2 {
-                    let (row, column) = entry(p.base + i * p.row + j * p.column);
-                    let (r, c) = (2 * a + i, 2 * b + j);
-                    assert_eq!((row, column), (r.max(c), r.min(c)));
+        for nodes in [[0, 1], [1, 0], [2, 0], [2, 3], [3, 2]] {
+            let positions = pattern.positions(&nodes.map(Some)).0;
+            for i in 0..4 {
+                for j in 0..=i {
+                    let [r, c] = [i, j].map(|k| 2 * nodes[k / 2] + k as u32 % 2);
+                    assert_eq!(entry(positions[i * (i + 1) / 2 + j]), (r.max(c), r.min(c)));
                 }
             }
         }
+        let of_fixed = pattern.positions(&[Some(1), None, Some(3)]).0;
+        assert_eq!(of_fixed.iter().filter(|position| **position != ABSENT).count(), 6);
     }
 
     #[test]

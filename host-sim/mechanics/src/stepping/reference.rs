@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::fem::element::{PACKED, add_tangent_and_force, linear_stiffness};
-use crate::fem::{BlockPosition, Cholesky, ElementPositions, Factor, Pattern};
+use crate::fem::{Cholesky, Factor, PackedPositions, Pattern};
 use crate::mesh::rotate;
 
 use super::newton::ANCHOR;
@@ -28,22 +28,14 @@ pub(super) struct SparseWheels<'p> {
 
 /// The sparse system for one set of flank pairs.
 struct SparseSystem {
-    pairs: BTreeMap<FlankPair, PairPositions>,
+    pairs: BTreeMap<FlankPair, PackedPositions>,
     pattern: Pattern,
-    fs_positions: Vec<ElementPositions>,
-    bore_positions: Vec<[Option<BlockPosition>; 3]>,
+    fs_positions: Vec<PackedPositions>,
+    bore_positions: Vec<PackedPositions>,
     /// Values of the circular spline, which do not change.
     cs_values: Vec<f64>,
     factor: Cholesky,
     values: Vec<f64>,
-}
-
-/// Where a pair's contribution goes.
-struct PairPositions {
-    /// Free node of each local node.
-    nodes: Vec<u32>,
-    /// Blocks of local node pairs (a, b < a) that the pattern holds.
-    blocks: Vec<(usize, usize, BlockPosition)>,
 }
 
 impl<'p> SparseWheels<'p> {
@@ -78,27 +70,13 @@ impl<'p> SparseWheels<'p> {
 
         let mut cs_values = vec![0.0; pattern.stored()];
         for (nodes, points) in cs_nodes.iter().zip(&problem.circular_spline.gauss) {
-            pattern.element(nodes).scatter(&linear_stiffness(points, &problem.material), &mut cs_values);
+            pattern.positions(nodes).scatter(&linear_stiffness(points, &problem.material), &mut cs_values);
         }
-        let fs_positions = problem.flexspline.elements.iter().map(|e| pattern.element(&e.map(Some))).collect();
-        let bore_positions = problem
-            .bore
-            .edges
-            .iter()
-            .map(|[a, m, b]| [pattern.block(*m, *a), pattern.block(*b, *a), pattern.block(*b, *m)])
-            .collect();
-        let pairs = pairs
-            .iter()
-            .zip(pair_nodes)
-            .map(|(&pair, (fs, cs))| {
-                let nodes: Vec<u32> = fs.into_iter().chain(cs).collect();
-                let blocks = (0..nodes.len())
-                    .flat_map(|a| (0..a).map(move |b| (a, b)))
-                    .filter_map(|(a, b)| Some((a, b, pattern.block(nodes[a], nodes[b])?)))
-                    .collect();
-                (pair, PairPositions { nodes, blocks })
-            })
-            .collect();
+        let fs_positions = problem.flexspline.elements.iter().map(|e| pattern.positions(&e.map(Some))).collect();
+        let bore_positions = problem.bore.edges.iter().map(|e| pattern.positions(&e.map(Some))).collect();
+        let of_pair =
+            |(fs, cs): (Vec<u32>, Vec<u32>)| pattern.positions(&fs.into_iter().chain(cs).map(Some).collect::<Vec<_>>());
+        let pairs = pairs.iter().copied().zip(pair_nodes.into_iter().map(of_pair)).collect();
         let values = vec![0.0; pattern.stored()];
         SparseSystem { pairs, pattern, fs_positions, bore_positions, cs_values, factor, values }
     }
@@ -179,35 +157,15 @@ impl Wheels for SparseWheels<'_> {
     }
 
     fn add_bore(&mut self, contact: &BorePressure) {
-        let nodes = self.problem.bore.edges[contact.edge];
-        let SparseSystem { pattern, bore_positions, values, .. } = self.system();
-        for (a, &n) in nodes.iter().enumerate() {
-            let row_x = a * (2 * a + 1);
-            let row_y = row_x + 2 * a + 1;
-            let [xx, yy] = pattern.diagonal(n).map(|p| p as usize);
-            values[xx] += contact.stiffness[row_x + 2 * a];
-            values[xx + 1] += contact.stiffness[row_y + 2 * a];
-            values[yy] += contact.stiffness[row_y + 2 * a + 1];
-            for b in 0..a {
-                let p = bore_positions[contact.edge][a * (a - 1) / 2 + b].expect("bore nodes share an element");
-                p.add(|i, j| contact.stiffness[[row_x, row_y][i] + 2 * b + j], values);
-            }
-        }
+        let system = self.system();
+        system.bore_positions[contact.edge].scatter(&contact.stiffness, &mut system.values);
     }
 
     fn add_flank(&mut self, pair: FlankPair, contact: &PairContribution) {
-        let SparseSystem { pattern, pairs, values, .. } = self.system();
-        let positions = &pairs[&pair];
+        let system = self.system();
         let n = contact.force.len();
-        for (a, &node) in positions.nodes.iter().enumerate() {
-            let [xx, yy] = pattern.diagonal(node).map(|p| p as usize);
-            values[xx] += contact.stiffness[2 * a * n + 2 * a];
-            values[xx + 1] += contact.stiffness[(2 * a + 1) * n + 2 * a];
-            values[yy] += contact.stiffness[(2 * a + 1) * n + 2 * a + 1];
-        }
-        for &(a, b, p) in &positions.blocks {
-            p.add(|i, j| contact.stiffness[(2 * a + i) * n + 2 * b + j], values);
-        }
+        let packed = (0..n).flat_map(|i| &contact.stiffness[i * n..=i * n + i]);
+        system.pairs[&pair].scatter(packed, &mut system.values);
     }
 
     fn anchor(&self) -> Vec<(usize, f64)> {
