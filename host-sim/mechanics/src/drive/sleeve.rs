@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use crate::toml_file::Problem;
+use super::error::Misfits;
 
 /// A choice among names in a drive file.
 pub(super) trait Choice {
@@ -185,66 +185,46 @@ impl Sleeve {
     }
 
     /// Whether its sizes go together, on a rim of this neutral radius.
-    pub(super) fn fit(&self, radius_mm: f64, problems: &mut Vec<Problem>) {
-        let mut require = |holds: bool, key: &str, what: String| {
-            if !holds {
-                problems.push(Problem::of(&format!("sleeve.{key}"), what));
-            }
-        };
-        let kind = self.kind.name();
+    pub(super) fn fit(&self, radius_mm: f64, misfits: &mut Misfits<'_>) {
+        const TORSION: &str = "sleeve.torsion_stiffness_n_m_per_rad";
+        const LATERAL: &str = "sleeve.lateral_stiffness_n_per_mm";
+        let is_stiff = self.lateral_stiffness_n_per_mm != 0.0;
         if !self.is_shell() {
             if self.kind == SleeveKind::None {
-                let found = self.torsion_stiffness_n_m_per_rad.map_or(String::new(), |k| k.to_string());
-                let allowed = "allowed with kind = \"none\": \"rigid\" (springs need kind = \"springs\")";
-                require(found.is_empty(), "torsion_stiffness_n_m_per_rad", format!("found {found}, {allowed}"));
-                let lateral = self.lateral_stiffness_n_per_mm;
-                let allowed = "allowed with kind = \"none\": 0 (springs need kind = \"springs\")";
-                require(lateral == 0.0, "lateral_stiffness_n_per_mm", format!("found {lateral}, {allowed}"));
+                let rigid = ", allowed with kind = \"none\": \"rigid\" (springs need kind = \"springs\")";
+                misfits.require(self.torsion_stiffness_n_m_per_rad.is_none(), TORSION, rigid);
+                let zero = ", allowed with kind = \"none\": 0 (springs need kind = \"springs\")";
+                misfits.require(!is_stiff, LATERAL, zero);
             }
             return;
         }
         let thin = 0.1 * radius_mm;
-        require(
-            self.wall_mm <= thin,
-            "wall_mm",
-            format!("found {}, allowed: up to {thin:.4} (a tenth of the neutral radius: a thin shell)", self.wall_mm),
-        );
+        let allowed = format!(", allowed: up to {thin:.4} (a tenth of the neutral radius: a thin shell)");
+        misfits.require(self.wall_mm <= thin, "sleeve.wall_mm", allowed);
         let shortest = 2.0 * self.wall_mm;
-        for (key, length, there) in [
-            ("flange_side_mm", self.flange_side_mm, self.has_flange()),
-            ("bottom_side_mm", self.bottom_side_mm, self.has_bottom()),
+        for (field, length, there) in [
+            ("sleeve.flange_side_mm", self.flange_side_mm, self.has_flange()),
+            ("sleeve.bottom_side_mm", self.bottom_side_mm, self.has_bottom()),
         ] {
-            let allowed = format!("found {length}, allowed: at least {shortest} (two walls: a tube)");
-            require(!there || length >= shortest, key, allowed);
+            let allowed = format!(", allowed: at least {shortest} (two walls: a tube)");
+            misfits.require(!there || length >= shortest, field, allowed);
         }
-        let lateral = self.lateral_stiffness_n_per_mm;
-        require(
-            lateral == 0.0,
-            "lateral_stiffness_n_per_mm",
-            format!("found {lateral}, allowed with kind = \"{kind}\": 0 (the shells hold the rim sideways)"),
-        );
+        let kind = self.kind.name();
+        let zero = format!(", allowed with kind = \"{kind}\": 0 (the shells hold the rim sideways)");
+        misfits.require(!is_stiff, LATERAL, zero);
         if self.has_bottom() && self.bottom == Bottom::Plate {
             let thickest = (self.bottom_side_mm - shortest).min(0.2 * radius_mm);
-            let thickness = self.bottom_thickness_mm;
-            require(
-                thickness <= thickest,
-                "bottom_thickness_mm",
-                format!("found {thickness}, allowed: up to {thickest:.4} (a plate inside the end of the tube)"),
-            );
-            let (hub, widest) = (self.hub_radius_mm, 0.95 * radius_mm);
-            require(
-                self.kind != SleeveKind::Cup || hub <= widest,
-                "hub_radius_mm",
-                format!("found {hub}, allowed: up to {widest:.4} (inside the tube)"),
-            );
+            let allowed = format!(", allowed: up to {thickest:.4} (a plate inside the end of the tube)");
+            misfits.require(self.bottom_thickness_mm <= thickest, "sleeve.bottom_thickness_mm", allowed);
+            let widest = 0.95 * radius_mm;
+            let fits = self.kind != SleeveKind::Cup || self.hub_radius_mm <= widest;
+            let allowed = format!(", allowed: up to {widest:.4} (inside the tube)");
+            misfits.require(fits, "sleeve.hub_radius_mm", allowed);
         }
         if self.has_flange() && self.flange == Flange::Diaphragm {
-            let (thickness, thickest) = (self.diaphragm_thickness_mm, 0.2 * radius_mm);
-            require(
-                thickness <= thickest,
-                "diaphragm_thickness_mm",
-                format!("found {thickness}, allowed: up to {thickest:.4} (a thin plate)"),
-            );
+            let thickest = 0.2 * radius_mm;
+            let allowed = format!(", allowed: up to {thickest:.4} (a thin plate)");
+            misfits.require(self.diaphragm_thickness_mm <= thickest, "sleeve.diaphragm_thickness_mm", allowed);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The drive as a value: every number of `drive.toml`, the built-in drives, derived sizes, temperature.
 
 use super::as_built::{AsBuilt, DamagedFlank, Harmonic, Wheel};
-use super::error::DriveError;
+use super::error::{DriveError, Misfits};
 use super::fields::{self, Slot};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
@@ -580,146 +580,81 @@ impl Drive {
             }
         });
         if problems.is_empty() {
-            self.fit(kinds, &mut problems);
+            problems = self.fit(kinds);
         }
         if problems.is_empty() { Ok(()) } else { Err(DriveError { problems }) }
     }
 
     /// The consistency of the parts, each finding with the field to change.
-    fn fit(&self, kinds: &[GeneratorKind], problems: &mut Vec<Problem>) {
+    fn fit(&self, kinds: &[GeneratorKind]) -> Vec<Problem> {
         let (f, c, g, t) = (&self.flexspline, &self.circular_spline, &self.generator, &self.temperature);
-        let mut require = |holds: bool, field: &str, what: String| {
-            if !holds {
-                problems.push(Problem::of(field, what));
-            }
-            holds
-        };
+        let mut misfits = Misfits { drive: self, problems: Vec::new() };
         let even = f.face == FaceLoad::Even;
         for (field, value) in [("flexspline.taper_mrad", f.taper_mrad), ("flexspline.crowning_um", f.crowning_um)] {
-            let what = format!(
-                "found {value}, allowed with face = \"even\": 0 (the load along the face needs face = \"slices\")"
-            );
-            require(!even || value == 0.0, field, what);
+            let zero = ", allowed with face = \"even\": 0 (the load along the face needs face = \"slices\")";
+            misfits.require(!even || value == 0.0, field, zero);
         }
-        require(
-            f.teeth % 2 == 0,
-            "flexspline.teeth",
-            format!("found {}, allowed: an even number (two waves)", f.teeth),
-        );
+        misfits.require(f.teeth % 2 == 0, "flexspline.teeth", ", allowed: an even number (two waves)");
         // Teeth of another number than the radii were drawn for say nothing of fillets and roundings.
-        let teeth = require(
-            c.teeth == f.teeth + 2,
-            "circular_spline.teeth",
-            format!("found {}, allowed: {}, two more than the flexspline (two waves)", c.teeth, f.teeth + 2),
-        );
-        require(
-            (c.module_mm / f.module_mm - 1.0).abs() <= 0.01,
-            "circular_spline.module_mm",
-            format!("found {}, allowed: within 1 % of the flexspline's {}", c.module_mm, f.module_mm),
-        );
-        require(
-            t.minimum_c < t.maximum_c,
-            "temperature.minimum_c",
-            format!("found {}, allowed: below maximum_c = {}", t.minimum_c, t.maximum_c),
-        );
-        require(
-            t.minimum_c <= t.reference_c && t.reference_c <= t.maximum_c,
-            "temperature.reference_c",
-            format!("found {}, allowed: {} to {}, the operating range", t.reference_c, t.minimum_c, t.maximum_c),
-        );
-        let mut radii = teeth
-            & require(
-                f.root_radius_mm < f.tip_radius_mm,
-                "flexspline.tip_radius_mm",
-                format!("found {}, allowed: above root_radius_mm = {}", f.tip_radius_mm, f.root_radius_mm),
-            );
-        radii &= require(
-            f.rim_thickness_mm <= 0.2 * f.root_radius_mm,
-            "flexspline.rim_thickness_mm",
-            format!(
-                "found {}, allowed: up to {} (a fifth of root_radius_mm: a thin ring)",
-                f.rim_thickness_mm,
-                0.2 * f.root_radius_mm
-            ),
-        );
-        radii &= require(
-            c.tip_radius_mm < c.root_radius_mm,
-            "circular_spline.tip_radius_mm",
-            format!("found {}, allowed: below root_radius_mm = {}", c.tip_radius_mm, c.root_radius_mm),
-        );
-        radii &= require(
-            c.outer_radius_mm - c.root_radius_mm >= c.module_mm,
-            "circular_spline.outer_radius_mm",
-            format!(
-                "found {}, allowed: at least {} (root_radius_mm and one module)",
-                c.outer_radius_mm,
-                c.root_radius_mm + c.module_mm
-            ),
-        );
-        self.as_built.fit(self, problems);
-        if !radii {
-            return;
+        let two_more = format!(", allowed: {}, two more than the flexspline (two waves)", f.teeth + 2);
+        let teeth = misfits.require(c.teeth == f.teeth + 2, "circular_spline.teeth", two_more);
+        let same_module = (c.module_mm / f.module_mm - 1.0).abs() <= 0.01;
+        let allowed = format!(", allowed: within 1 % of the flexspline's {}", f.module_mm);
+        misfits.require(same_module, "circular_spline.module_mm", allowed);
+        let allowed = format!(", allowed: below maximum_c = {}", t.maximum_c);
+        misfits.require(t.minimum_c < t.maximum_c, "temperature.minimum_c", allowed);
+        let operating = t.minimum_c <= t.reference_c && t.reference_c <= t.maximum_c;
+        let allowed = format!(", allowed: {} to {}, the operating range", t.minimum_c, t.maximum_c);
+        misfits.require(operating, "temperature.reference_c", allowed);
+        let allowed = format!(", allowed: above root_radius_mm = {}", f.root_radius_mm);
+        let mut radii = misfits.require(f.root_radius_mm < f.tip_radius_mm, "flexspline.tip_radius_mm", allowed);
+        let thickest = 0.2 * f.root_radius_mm;
+        let allowed = format!(", allowed: up to {thickest} (a fifth of root_radius_mm: a thin ring)");
+        radii &= misfits.require(f.rim_thickness_mm <= thickest, "flexspline.rim_thickness_mm", allowed);
+        let allowed = format!(", allowed: below root_radius_mm = {}", c.root_radius_mm);
+        radii &= misfits.require(c.tip_radius_mm < c.root_radius_mm, "circular_spline.tip_radius_mm", allowed);
+        let is_ring = c.outer_radius_mm - c.root_radius_mm >= c.module_mm;
+        let least = c.root_radius_mm + c.module_mm;
+        let allowed = format!(", allowed: at least {least} (root_radius_mm and one module)");
+        radii &= misfits.require(is_ring, "circular_spline.outer_radius_mm", allowed);
+        self.as_built.fit(self, &mut misfits.problems);
+        if !(teeth && radii) {
+            return misfits.problems;
         }
-        self.sleeve.fit(f.neutral_radius_mm(), problems);
-        let mut require = |holds: bool, field: &str, what: String| {
-            if !holds {
-                problems.push(Problem::of(field, what));
-            }
-        };
-        require(
-            g.w0_mm <= 0.05 * f.neutral_radius_mm(),
-            "generator.w0_mm",
-            format!(
-                "found {}, allowed: up to {:.4} (a twentieth of the neutral radius)",
-                g.w0_mm,
-                0.05 * f.neutral_radius_mm()
-            ),
+        self.sleeve.fit(f.neutral_radius_mm(), &mut misfits);
+        let w0 = g.w0_mm;
+        let largest = 0.05 * f.neutral_radius_mm();
+        let allowed = format!(", allowed: up to {largest:.4} (a twentieth of the neutral radius)");
+        misfits.require(w0 <= largest, "generator.w0_mm", allowed);
+        let meets_root = format!(
+            ": with w0_mm = {w0} the tip would stand in the circular-spline root at the major axis; allowed: below {:.4}",
+            c.root_radius_mm - w0
         );
-        require(
-            f.tip_radius_mm + g.w0_mm < c.root_radius_mm,
-            "flexspline.tip_radius_mm",
-            format!(
-                "found {}: with w0_mm = {} the tip would stand in the circular-spline root at the major axis; \
-                 allowed: below {:.4}",
-                f.tip_radius_mm,
-                g.w0_mm,
-                c.root_radius_mm - g.w0_mm
-            ),
+        misfits.require(f.tip_radius_mm + w0 < c.root_radius_mm, "flexspline.tip_radius_mm", meets_root);
+        let meets_root = format!(
+            ": with w0_mm = {w0} the tip would stand in the flexspline root at the major axis; allowed: above {:.4}",
+            f.root_radius_mm + w0
         );
-        require(
-            f.root_radius_mm + g.w0_mm < c.tip_radius_mm,
-            "circular_spline.tip_radius_mm",
-            format!(
-                "found {}: with w0_mm = {} the tip would stand in the flexspline root at the major axis; allowed: \
-                 above {:.4}",
-                c.tip_radius_mm,
-                g.w0_mm,
-                f.root_radius_mm + g.w0_mm
-            ),
-        );
+        misfits.require(f.root_radius_mm + w0 < c.tip_radius_mm, "circular_spline.tip_radius_mm", meets_root);
         for &kind in kinds {
             let minor = f.tip_radius_mm + g.shape(kind).w(FRAC_PI_2);
-            require(
-                minor < c.tip_radius_mm,
-                "generator.w0_mm",
-                format!(
-                    "found {}: with the {kind} generator the tips meet at the minor axis (flexspline tip at \
-                     {minor:.4} mm, circular-spline tip at {} mm); allowed: a larger w0_mm or lower tips",
-                    g.w0_mm, c.tip_radius_mm
-                ),
+            let tips_meet = format!(
+                ": with the {kind} generator the tips meet at the minor axis (flexspline tip at {minor:.4} mm, \
+                 circular-spline tip at {} mm); allowed: a larger w0_mm or lower tips",
+                c.tip_radius_mm
             );
+            misfits.require(minor < c.tip_radius_mm, "generator.w0_mm", tips_meet);
         }
+        let mut problems = misfits.problems;
         for refused in [ToothFlank::external(self).err(), ToothFlank::internal(self).err()].into_iter().flatten() {
             // An S-shaped tooth that is none makes no space either, for the same reason.
             let new: Vec<Problem> =
                 refused.problems.into_iter().filter(|problem| !problems.contains(problem)).collect();
             problems.extend(new);
         }
-        for &kind in kinds {
-            if let Err(refused) = GeneratorOutline::new(self, kind) {
-                problems.extend(refused.problems);
-            }
-        }
+        problems
+            .extend(kinds.iter().filter_map(|kind| GeneratorOutline::new(self, *kind).err()).flat_map(|e| e.problems));
+        problems
     }
 }
 
