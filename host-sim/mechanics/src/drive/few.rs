@@ -52,6 +52,14 @@ const BACKLASH_RAD: f64 = 1.0 / ARCMIN_PER_RAD;
 /// Halvings of the range of the shift: to 1e-4 modules, half a percent of the backlash.
 const HALVINGS: usize = 13;
 
+impl MadeDrive {
+    /// Sets a length, mm, and says how it was found.
+    fn put(&mut self, path: &'static str, value_mm: f64, formula: impl Into<String>) {
+        *self.drive.number_mut(path).expect("the path of a number") = rounded(value_mm);
+        self.formulas.push((path, formula.into()));
+    }
+}
+
 impl FewNumbers {
     /// Teeth of the flexspline that can be asked for.
     pub(crate) const TEETH: [u32; 2] = [60, 800];
@@ -80,36 +88,21 @@ impl FewNumbers {
         Err(refused.unwrap_or_else(|| Problem::of("teeth", "no room").into()))
     }
 
-    /// The drive with these heights of its teeth, modules.
-    fn with_heights(
-        &self,
-        name: &str,
-        [flexspline_tip, circular_spline_root]: [f64; 2],
-    ) -> Result<MadeDrive, DriveError> {
+    /// The drive with these heights of its teeth, modules: tip of the flexspline, root of the circular spline.
+    fn with_heights(&self, name: &str, [tip, root]: [f64; 2]) -> Result<MadeDrive, DriveError> {
         let m = self.module_mm;
         let [inner, outer] = [self.teeth, self.teeth + 2].map(|teeth| 0.5 * m * f64::from(teeth));
         let like = Drive::hhd_95();
-        let pitch_radius_mm = 0.5 * like.flexspline.module_mm * f64::from(like.flexspline.teeth);
+        let pitch_radius_mm = like.flexspline.pitch_radius_mm();
         let scale = inner / pitch_radius_mm;
-        let mut made = MadeDrive { drive: like.clone(), formulas: Vec::new() };
-        let drive = &mut made.drive;
-        drive.name = name.to_owned();
-        let mut put = |drive: &mut Drive, path: &'static str, value: f64, formula: String| {
-            *drive.number_mut(path).expect("the path of a number") = rounded(value);
-            made.formulas.push((path, formula));
-        };
+        let mut made = MadeDrive { drive: Drive { name: name.to_owned(), ..like.clone() }, formulas: Vec::new() };
 
-        let circles = format!("pitch radius: module x teeth / 2 = {}", rounded(inner));
-        let f = &mut drive.flexspline;
+        let f = &mut made.drive.flexspline;
         (f.teeth, f.module_mm, f.profile_shift) = (self.teeth, m, SHIFT);
-        put(drive, "flexspline.root_radius_mm", inner + ROOT * m, format!("{circles}; + {ROOT} modules"));
-        put(
-            drive,
-            "flexspline.tip_radius_mm",
-            inner + flexspline_tip * m,
-            format!("pitch radius + {flexspline_tip} modules"),
-        );
-        let root_mm = drive.flexspline.root_radius_mm;
+        let circles = format!("pitch radius: module x teeth / 2 = {}", rounded(inner));
+        made.put("flexspline.root_radius_mm", inner + ROOT * m, format!("{circles}; + {ROOT} modules"));
+        made.put("flexspline.tip_radius_mm", inner + tip * m, format!("pitch radius + {tip} modules"));
+        let root_mm = made.drive.flexspline.root_radius_mm;
         let (rim_mm, why) = match self.bore_mm {
             Some(bore) => (root_mm - 0.5 * bore, format!("root radius - half the bore of {bore}")),
             None => (like.flexspline.rim_thickness_mm * scale, "0.02553 pitch radii, as HHD-95".to_owned()),
@@ -126,52 +119,37 @@ impl FewNumbers {
             );
             return Err(Problem::of("bore", what).into());
         }
-        put(drive, "flexspline.rim_thickness_mm", rim_mm, why);
-        let width_mm = like.flexspline.width_mm * scale;
-        put(drive, "flexspline.width_mm", width_mm, "0.4255 pitch radii, as HHD-95".to_owned());
-        put(drive, "flexspline.root_fillet_mm", 0.24 * m, "0.24 modules".to_owned());
-        put(drive, "flexspline.tip_rounding_mm", 0.06 * m, "0.06 modules".to_owned());
-        let bore_radius_mm = drive.flexspline.bore_radius_mm();
+        made.put("flexspline.rim_thickness_mm", rim_mm, why);
+        made.put("flexspline.width_mm", like.flexspline.width_mm * scale, "0.4255 pitch radii, as HHD-95");
+        made.put("flexspline.root_fillet_mm", 0.24 * m, "0.24 modules");
+        made.put("flexspline.tip_rounding_mm", 0.06 * m, "0.06 modules");
 
-        (drive.circular_spline.teeth, drive.circular_spline.module_mm) = (self.teeth + 2, m);
+        let c = &mut made.drive.circular_spline;
+        (c.teeth, c.module_mm) = (self.teeth + 2, m);
         let circles = format!("pitch radius: module x teeth / 2 = {}", rounded(outer));
-        put(
-            drive,
-            "circular_spline.root_radius_mm",
-            outer + circular_spline_root * m,
-            format!("{circles}; + {circular_spline_root} modules"),
-        );
-        put(drive, "circular_spline.tip_radius_mm", outer + TIP * m, format!("pitch radius + {TIP} modules"));
+        made.put("circular_spline.root_radius_mm", outer + root * m, format!("{circles}; + {root} modules"));
+        made.put("circular_spline.tip_radius_mm", outer + TIP * m, format!("pitch radius + {TIP} modules"));
         let outer_mm = outer * like.circular_spline.outer_radius_mm / (pitch_radius_mm + like.flexspline.module_mm);
         // Fewer teeth are larger in proportion to the ring.
-        let outer_mm = outer_mm.max(drive.circular_spline.root_radius_mm + 4.0 * m);
-        put(
-            drive,
-            "circular_spline.outer_radius_mm",
-            outer_mm,
-            "1.126 pitch radii, as HHD-95; at least 4 modules outside the root".to_owned(),
-        );
-        put(drive, "circular_spline.root_fillet_mm", 0.16 * m, "0.16 modules".to_owned());
-        put(drive, "circular_spline.tip_rounding_mm", 0.06 * m, "0.06 modules".to_owned());
+        let outer_mm = outer_mm.max(made.drive.circular_spline.root_radius_mm + 4.0 * m);
+        let why = "1.126 pitch radii, as HHD-95; at least 4 modules outside the root";
+        made.put("circular_spline.outer_radius_mm", outer_mm, why);
+        made.put("circular_spline.root_fillet_mm", 0.16 * m, "0.16 modules");
+        made.put("circular_spline.tip_rounding_mm", 0.06 * m, "0.06 modules");
 
-        put(drive, "generator.w0_mm", m, "half the difference of the pitch diameters: one module".to_owned());
-        put(
-            drive,
-            "generator.roller_diameter_mm",
-            like.generator.roller_diameter_mm * bore_radius_mm / like.flexspline.bore_radius_mm(),
-            "0.557 bore radii, as HHD-95".to_owned(),
-        );
+        made.put("generator.w0_mm", m, "half the difference of the pitch diameters: one module");
+        let bore_radius_mm = made.drive.flexspline.bore_radius_mm();
+        let roller_mm = like.generator.roller_diameter_mm * bore_radius_mm / like.flexspline.bore_radius_mm();
+        made.put("generator.roller_diameter_mm", roller_mm, "0.557 bore radii, as HHD-95");
         // Not rounded as sizes are: the drag of a small drive would be none, and nothing would hold its output.
-        drive.output.drag_torque_n_m = three_digits(like.output.drag_torque_n_m * scale.powi(3));
+        made.drive.output.drag_torque_n_m = three_digits(like.output.drag_torque_n_m * scale.powi(3));
         made.formulas.push(("output.drag_torque_n_m", "0.02 N.m of HHD-95, with the cube of the diameter".to_owned()));
-        drive.circular_spline.profile_shift = self.shift(drive)?;
-        made.formulas.push((
-            "circular_spline.profile_shift",
-            format!(
-                "solved: a rigid backlash of 1 arcmin with the {} generator, and teeth that clear under all four",
-                self.generator
-            ),
-        ));
+        made.drive.circular_spline.profile_shift = self.shift(&made.drive)?;
+        let why = format!(
+            "solved: a rigid backlash of 1 arcmin with the {} generator, and teeth that clear under all four",
+            self.generator
+        );
+        made.formulas.push(("circular_spline.profile_shift", why));
         made.drive.check()?;
         Ok(made)
     }
