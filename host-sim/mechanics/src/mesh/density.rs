@@ -20,33 +20,17 @@ use crate::suggest::UnknownName;
 ///            +------------+       bore (flexspline) or outer radius (circular spline)
 ///        tooth axis    space axis
 /// ```
+///
+/// In this order: columns of the half tooth; columns from the middle of the fillet to the space axis, half fillet and
+/// root land; rows of the rim below the interface circle; rows between the interface circle and the fillet; elements on
+/// the upper half of the fillet; elements on the flank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MeshDensity {
-    /// Columns of the half tooth.
-    pub tooth_columns: usize,
-    /// Columns from the middle of the fillet to the space axis: half fillet and root land.
-    pub space_columns: usize,
-    /// Rows of the rim below the interface circle.
-    pub rim_rows: usize,
-    /// Rows between the interface circle and the fillet.
-    pub root_rows: usize,
-    /// Elements on the upper half of the fillet.
-    pub fillet_elements: usize,
-    /// Elements on the flank.
-    pub flank_elements: usize,
-}
+pub struct MeshDensity(pub(super) [usize; 6]);
 
 impl MeshDensity {
     /// Multiple of the elements in each direction.
     pub fn times(self, factor: usize) -> MeshDensity {
-        MeshDensity {
-            tooth_columns: factor * self.tooth_columns,
-            space_columns: factor * self.space_columns,
-            rim_rows: factor * self.rim_rows,
-            root_rows: factor * self.root_rows,
-            fillet_elements: factor * self.fillet_elements,
-            flank_elements: factor * self.flank_elements,
-        }
+        MeshDensity(self.0.map(|elements| factor * elements))
     }
 }
 
@@ -71,23 +55,21 @@ impl MeshLevel {
     /// Density of the flexspline. Two rows at the root matter most: the rim bends between the teeth, and one row there
     /// is 0.4″ out in the wind-up of the four-roller drive at 50 N·m, columns and rim rows hardly count.
     pub fn flexspline(self) -> MeshDensity {
-        let [tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements] = match self {
+        MeshDensity(match self {
             MeshLevel::Coarse => [1, 1, 1, 1, 1, 2],
             MeshLevel::Standard => [2, 2, 2, 2, 1, 3],
             MeshLevel::Fine => [4, 4, 4, 4, 2, 6],
-        };
-        MeshDensity { tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements }
+        })
     }
 
     /// Density of the circular spline: a solid ring that needs little, and flanks that need as much as the load is
     /// narrow.
     pub fn circular_spline(self) -> MeshDensity {
-        let [tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements] = match self {
+        MeshDensity(match self {
             MeshLevel::Coarse => [1, 1, 1, 1, 1, 2],
             MeshLevel::Standard => [1, 1, 1, 1, 1, 5],
             MeshLevel::Fine => [2, 2, 2, 2, 2, 10],
-        };
-        MeshDensity { tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements }
+        })
     }
 }
 

@@ -116,7 +116,7 @@ fn transfinite(bottom: &[Point], top: &[Point], left: &[Point], right: &[Point])
 impl HalfSector {
     /// Meshes the half sector.
     pub fn new(outline: &HalfOutline, density: &MeshDensity) -> HalfSector {
-        let MeshDensity { tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements } =
+        let MeshDensity([tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements]) =
             *density;
         let columns = tooth_columns + space_columns;
 
