@@ -50,15 +50,29 @@ pub struct FlankPair {
     pub side: Side,
 }
 
-/// An integration point on the flexspline flank, in the frame of its tooth, plus side.
+/// A place on the flexspline flank, in the frame of its tooth, plus side.
 #[derive(Debug, Clone, Copy)]
-pub struct FlankPoint {
+pub struct FlankPlace {
     /// Undeformed position.
     pub position: [f64; 2],
     /// Edge of the flank mesh that carries it.
     pub edge: usize,
     /// Shape functions there.
     pub shape: [f64; 3],
+}
+
+impl FlankPlace {
+    fn new(mesh: &FlankMesh, position: [f64; 2], radius_mm: f64) -> FlankPlace {
+        let (edge, xi) = mesh.locate(radius_mm);
+        FlankPlace { position, edge, shape: edge_shape(xi) }
+    }
+}
+
+/// An integration point on the flexspline flank.
+#[derive(Debug, Clone, Copy)]
+pub struct FlankPoint {
+    /// Where it is.
+    pub place: FlankPlace,
     /// Arc length it stands for, mm.
     pub weight: f64,
     /// Arc length along the outline, from root to tip.
@@ -91,20 +105,13 @@ pub struct FlankContact<'a> {
     pub space: ActiveFlank,
     deviations: &'a FlankDeviations,
     /// A few points of the plus and of the minus flank of a tooth.
-    coarse: [Vec<CoarsePoint>; 2],
+    coarse: [Vec<FlankPlace>; 2],
     /// Sine and cosine of the angle of each flexspline tooth and of each circular-spline space.
     fs_turns: Vec<(f64, f64)>,
     cs_turns: Vec<(f64, f64)>,
     rule: Vec<(f64, f64)>,
     /// The load along the face, where it is not even.
     face: Option<FaceLaw>,
-}
-
-/// Where the gap of a pair is looked at in the search.
-struct CoarsePoint {
-    position: [f64; 2],
-    edge: usize,
-    shape: [f64; 3],
 }
 
 /// Contribution of one pair. Local nodes: flexspline flank nodes, then circular-spline flank nodes; two unknowns each.
@@ -252,8 +259,7 @@ impl<'a> FlankContact<'a> {
         let coarse = Side::BOTH.map(|side| {
             let point = |i: i32| {
                 let radius = a + (b - a) * f64::from(i) / 6.0;
-                let (edge, xi) = fs_mesh.flanks[side.index()].locate(radius);
-                CoarsePoint { position: tooth.point(radius), edge, shape: edge_shape(xi) }
+                FlankPlace::new(&fs_mesh.flanks[side.index()], tooth.point(radius), radius)
             };
             // a smooth ring has no flanks
             let points = if fs_mesh.flanks[side.index()].nodes.is_empty() { 0..0 } else { 0..7 };
@@ -328,9 +334,8 @@ impl<'a> FlankContact<'a> {
     fn smallest_gap_in(&self, pair: FlankPair, field: &LocalField) -> f64 {
         self.coarse[pair.side.index()]
             .iter()
-            .map(|point| {
-                let foot =
-                    self.foot(pair, field, self.seen_from_space(field, point.position, point.edge, &point.shape));
+            .map(|place| {
+                let foot = self.foot(pair, field, self.seen_from_space(field, place));
                 let outside = field.across.is_none() && foot.radius < self.space.tip_radius + 1e-9;
                 if outside { f64::INFINITY } else { foot.distance }
             })
@@ -339,10 +344,8 @@ impl<'a> FlankContact<'a> {
 
     /// True where it is plain at a glance that the smallest gap is not below `reach_mm`.
     fn is_farther(&self, pair: FlankPair, field: &LocalField, reach_mm: f64) -> bool {
-        self.coarse[pair.side.index()].iter().all(|point| {
-            let x = self.seen_from_space(field, point.position, point.edge, &point.shape);
-            self.least_distance(field, x) > reach_mm
-        })
+        let mut places = self.coarse[pair.side.index()].iter();
+        places.all(|place| self.least_distance(field, self.seen_from_space(field, place)) > reach_mm)
     }
 
     /// A lower bound of the gap at a point: it leaves out the rounding of the tip, and no displacement of the circular
@@ -402,7 +405,7 @@ impl<'a> FlankContact<'a> {
     fn bearing(&self, pair: FlankPair, field: &LocalField, law: FlankLaw, points: &[FlankPoint]) -> Option<Bearing> {
         let Some(across) = &field.across else { return Some(Bearing::EVEN) };
         let near = points.iter().filter_map(|point| {
-            let x = self.seen_from_space(field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(field, &point.place);
             if self.least_distance(field, x) > 0.0 {
                 return None;
             }
@@ -444,10 +447,10 @@ impl<'a> FlankContact<'a> {
 
     /// A point of the flexspline flank in the space frame.
     #[inline]
-    fn seen_from_space(&self, field: &LocalField, position: [f64; 2], edge: usize, shape: &[f64; 3]) -> [f64; 2] {
-        let mut x = field.tooth.place(position);
-        for (i, n) in shape.iter().enumerate() {
-            let d = field.fs[2 * edge + i];
+    fn seen_from_space(&self, field: &LocalField, place: &FlankPlace) -> [f64; 2] {
+        let mut x = field.tooth.place(place.position);
+        for (i, n) in place.shape.iter().enumerate() {
+            let d = field.fs[2 * place.edge + i];
             x[0] += n * d[0];
             x[1] += n * d[1];
         }
@@ -486,8 +489,8 @@ impl<'a> FlankContact<'a> {
         let mut points = Vec::with_capacity(4 * (breaks.len() + 3));
         let arc_of = |r: f64| self.tooth.arc_at(r);
         let point = |position: [f64; 2], radius: f64, weight: f64, arc: f64| {
-            let (edge, xi) = flank.locate(radius);
-            FlankPoint { position, edge, shape: edge_shape(xi), weight, arc, start_traction: 0.0, start_foot: 0.0 }
+            let place = FlankPlace::new(flank, position, radius);
+            FlankPoint { place, weight, arc, start_traction: 0.0, start_foot: 0.0 }
         };
         for panel in breaks.windows(2) {
             let (middle, half) = (0.5 * (panel[0] + panel[1]), 0.5 * (panel[1] - panel[0]));
@@ -519,8 +522,8 @@ impl<'a> FlankContact<'a> {
         const PLACES: usize = 32;
         let flank = self.fs_flank(pair);
         let gap = |r: f64| {
-            let (edge, xi) = flank.locate(r);
-            self.foot(pair, field, self.seen_from_space(field, self.tooth.point(r), edge, &edge_shape(xi))).distance
+            let place = FlankPlace::new(flank, self.tooth.point(r), r);
+            self.foot(pair, field, self.seen_from_space(field, &place)).distance
         };
         let (start, end) = (self.tooth.start_radius, self.tooth.junction_radius);
         let at = |k: usize| start + (end - start) * k as f64 / PLACES as f64;
@@ -541,9 +544,8 @@ impl<'a> FlankContact<'a> {
         let flank = self.fs_flank(pair);
         let corner = self.space.junction_radius;
         let facing = |r: f64| {
-            let (edge, xi) = flank.locate(r);
-            let x = self.seen_from_space(field, self.tooth.point(r), edge, &edge_shape(xi));
-            self.space.foot_radius(field.space.recover(x))
+            let place = FlankPlace::new(flank, self.tooth.point(r), r);
+            self.space.foot_radius(field.space.recover(self.seen_from_space(field, &place)))
         };
         let mut r = corner - (facing(self.tooth.junction_radius) - self.tooth.junction_radius);
         for _ in 0..4 {
@@ -562,7 +564,7 @@ impl<'a> FlankContact<'a> {
     ) {
         let field = self.local_field(pair, at);
         for point in points {
-            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(&field, &point.place);
             let foot = self.foot(pair, &field, x);
             point.start_foot = foot.arc;
             point.start_traction = interpolate(history, point.arc);
@@ -585,7 +587,7 @@ impl<'a> FlankContact<'a> {
         points.iter().zip(&touches).map(history).collect()
     }
 
-    /// Largest pressure of a pair, MPa, by its force and the shape of its gap ([`super::contact_modulus_mpa`]); where
+    /// Largest pressure of a pair, MPa, by its force and the shape of its gap (`Problem::contact_modulus_mpa`); where
     /// the load along the face is largest. Nothing of a pair that is open.
     pub(crate) fn peak_pressure_mpa(
         &self,
@@ -639,7 +641,7 @@ impl<'a> FlankContact<'a> {
         let field = self.local_field(pair, at);
         let bearing = self.bearing(pair, &field, law, points)?;
         let touch = |point: &FlankPoint| {
-            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(&field, &point.place);
             let foot = self.foot(pair, &field, x);
             let gap = foot.distance + bearing.later_mm;
             let place = FacePoint { arc: point.arc, gap, force: law.stiffness * point.weight * (-gap).max(0.0) };
@@ -666,7 +668,7 @@ impl<'a> FlankContact<'a> {
     ) -> Option<Across> {
         let field = self.local_field(pair, at);
         for point in points {
-            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(&field, &point.place);
             let foot = self.foot(pair, &field, x);
             let [nx, ny] = foot.normal;
             report(foot.distance, pair.side.sign() * (nx * x[1] - ny * x[0]), point.weight);
@@ -708,7 +710,7 @@ impl<'a> FlankContact<'a> {
         let later = bearing.map_or(0.0, |bearing| bearing.later_mm);
         let mut uneven = field.across.is_some().then(|| MeanBearing::new(n));
         for point in points {
-            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(&field, &point.place);
             // Most points are open, and a glance says so.
             let least = self.least_distance(&field, x);
             if least > 0.0 {
@@ -756,7 +758,7 @@ impl<'a> FlankContact<'a> {
                 let mut g = [0.0; 12];
                 for i in 0..3 {
                     for k in 0..2 {
-                        g[2 * i + k] = point.shape[i] * on_tooth[k];
+                        g[2 * i + k] = point.place.shape[i] * on_tooth[k];
                         g[6 + 2 * i + k] = -cs_shape[i] * on_space[k];
                     }
                 }
@@ -768,8 +770,9 @@ impl<'a> FlankContact<'a> {
             let (s, s_output) = gradient(foot.tangent);
             let normal_load = pressure * point.weight;
             let tangential_load = friction * point.weight;
-            let index: [usize; 12] =
-                std::array::from_fn(|i| if i < 6 { 2 * (2 * point.edge) + i } else { 2 * (nf + 2 * cs_edge) + i - 6 });
+            let index: [usize; 12] = std::array::from_fn(|i| {
+                if i < 6 { 2 * (2 * point.place.edge) + i } else { 2 * (nf + 2 * cs_edge) + i - 6 }
+            });
             let (kn, kt) = (law.stiffness * point.weight, stick * point.weight);
             for i in 0..12 {
                 out.force[index[i]] += normal_load * g[i] - tangential_load * s[i];
@@ -937,7 +940,7 @@ mod tests {
                     let pair = FlankPair { side, ..PAIR };
                     let field = flanks.local_field(pair, at);
                     for point in flanks.layout(pair, at).points {
-                        let x = flanks.seen_from_space(&field, point.position, point.edge, &point.shape);
+                        let x = flanks.seen_from_space(&field, &point.place);
                         let (foot, least) = (flanks.foot(pair, &field, x), flanks.least_distance(&field, x));
                         assert!(least <= foot.distance.max(0.0), "{least} of {}", foot.distance);
                         tightest = tightest.min(foot.distance - least);
@@ -1054,7 +1057,7 @@ mod tests {
                 assert!((found - expected).abs() < 1e-12, "{found} mm of {expected} mm");
                 assert!(layout.points.windows(2).all(|p| p[0].arc < p[1].arc), "not from root to tip");
                 for p in &layout.points {
-                    assert!((p.shape.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+                    assert!((p.place.shape.iter().sum::<f64>() - 1.0).abs() < 1e-14);
                 }
             }
         });
@@ -1064,9 +1067,7 @@ mod tests {
     fn friction_sticks_up_to_its_limit() {
         let law = FlankLaw { stiffness: 1e7, stick_stiffness: 1e6, friction: 0.1 };
         let point = FlankPoint {
-            position: [0.0; 2],
-            edge: 0,
-            shape: [0.0; 3],
+            place: FlankPlace { position: [0.0; 2], edge: 0, shape: [0.0; 3] },
             weight: 1.0,
             arc: 0.0,
             start_traction: 2.0,

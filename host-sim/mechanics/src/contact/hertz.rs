@@ -33,11 +33,6 @@ pub(super) struct FacePoint {
     pub force: f64,
 }
 
-/// Modulus of two bodies of one material that touch, MPa.
-pub(crate) fn contact_modulus_mpa(youngs_modulus_mpa: f64, poissons_ratio: f64) -> f64 {
-    0.5 * youngs_modulus_mpa / (1.0 - poissons_ratio * poissons_ratio)
-}
-
 /// Largest pressure of flanks that bear at these places, in growing arc, with this multiple of the force; MPa. Where
 /// they bear in several places, as at both of their tips, each is a contact of its own, up to where the gap between
 /// them is widest. `least_radius` (mm) is that of both roundings together, tip on tip: no gap is more curved, and no

@@ -18,8 +18,7 @@ mod quadrature;
 pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
 pub(crate) use face::{Across, Bearing, FaceLaw, Lean};
 pub use flank::{
-    AlongFace, BearingPlace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint,
+    AlongFace, BearingPlace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPlace, FlankPoint,
     FrictionHistory, PairContribution, SlipPoint,
 };
-pub(crate) use hertz::contact_modulus_mpa;
 pub use quadrature::gauss_legendre;

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::contact::{BoreContact, BoreLaw, FaceLaw, FlankContact, FlankLaw, Lean, contact_modulus_mpa};
+use crate::contact::{BoreContact, BoreLaw, FaceLaw, FlankContact, FlankLaw, Lean};
 use crate::drive::{
     ActiveFlank, Drive, FaceLoad, FlankDeviations, GeneratorKind, GeneratorOutline, RimVariation, Side, ToothFlank,
 };
@@ -336,8 +336,7 @@ impl Problem {
 
     /// Modulus of two flanks that touch, MPa.
     pub fn contact_modulus_mpa(&self) -> f64 {
-        let material = &self.drive.material;
-        contact_modulus_mpa(material.youngs_modulus_mpa, material.poissons_ratio)
+        0.5 * self.drive.material.plane_strain_modulus_mpa()
     }
 
     /// Drag torque on the output (N mm/mm) at a displacement from its anchor, and the stiffness with which it holds.
