@@ -52,7 +52,8 @@ pub struct BorderedSystem {
     schur: Vec<f64>,
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// Sum of products, one after the other.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 

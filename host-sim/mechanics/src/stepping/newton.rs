@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use crate::contact::{AlongFace, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
-use crate::fem::{Border, BorderedSystem};
+use crate::fem::{Border, BorderedSystem, dot};
 use crate::mesh::rotate;
 
 use super::continuation::{
@@ -110,6 +110,9 @@ impl Face {
     pub const EVEN: Face = Face { tilt_rad: 0.0, skew_rad: 0.0, peak_over_mean: 1.0, share: 1.0 };
 }
 
+/// Where the drive stands, and how it was found.
+type Solved = Result<(State, Increment), SolveError>;
+
 /// Newton solver with its work space: one per thread.
 pub struct Solver<'p> {
     problem: &'p Problem,
@@ -170,7 +173,7 @@ impl<'p> Solver<'p> {
     }
 
     /// The flexspline deformed by the generator at `generator_rad`, without load.
-    pub fn deform(&mut self, generator_rad: f64) -> Result<(State, Increment), SolveError> {
+    pub fn deform(&mut self, generator_rad: f64) -> Solved {
         let mut work = WorkLimit::new(&self.problem.settings);
         let shape = self.problem.starting_shape(generator_rad);
         // All of a conforming generator touches at once; a soft contact first finds which part stays.
@@ -187,12 +190,7 @@ impl<'p> Solver<'p> {
 
     /// Turns the generator to `generator_rad` and brings the load to `torque_n_m`, in one increment or, where Newton
     /// needs it, in several.
-    pub fn increment(
-        &mut self,
-        from: &State,
-        generator_rad: f64,
-        torque_n_m: f64,
-    ) -> Result<(State, Increment), SolveError> {
+    pub fn increment(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Solved {
         let mut work = WorkLimit::new(&self.problem.settings);
         let mut way = Continuation::new(from, generator_rad, torque_n_m);
         let mut state = from.clone();
@@ -234,7 +232,7 @@ impl<'p> Solver<'p> {
     /// Turns the generator on, by whole flexspline pitches and under the same load, to a place where an imperfect drive
     /// stands differently: the state is turned with it, and a soft contact finds the way first. For flanks without
     /// friction: what they remember is not carried along.
-    pub fn jump(&mut self, from: &State, generator_rad: f64) -> Result<(State, Increment), SolveError> {
+    pub fn jump(&mut self, from: &State, generator_rad: f64) -> Solved {
         // The output goes on at its mean rate, whatever it did last.
         let from = &State { output_rate: 1.0 / self.problem.drive.ratio(), ..from.clone() };
         let sought = Sought { from, generator_rad, torque_n_m: from.torque_n_m, stage: ContactStage::default() };
@@ -244,7 +242,7 @@ impl<'p> Solver<'p> {
     }
 
     /// One part of an increment, by each of the ways to its load until one leads there.
-    fn solve_part(&mut self, sought: Sought<'_>, work: &mut WorkLimit) -> Result<(State, Increment), SolveError> {
+    fn solve_part(&mut self, sought: Sought<'_>, work: &mut WorkLimit) -> Solved {
         let Sought { from, torque_n_m, stage, .. } = sought;
         if torque_n_m == from.torque_n_m {
             let turned = self.newton(sought, from, work);
@@ -265,12 +263,7 @@ impl<'p> Solver<'p> {
     }
 
     /// Newton with contact that is soft at first: by these factors on the penalties in turn, then as hard as it is.
-    fn newton_softly(
-        &mut self,
-        sought: Sought<'_>,
-        softness: &[f64],
-        work: &mut WorkLimit,
-    ) -> Result<(State, Increment), SolveError> {
+    fn newton_softly(&mut self, sought: Sought<'_>, softness: &[f64], work: &mut WorkLimit) -> Solved {
         let mut guess = sought.from.clone();
         let mut iterations = 0;
         for &softening in softness {
@@ -285,12 +278,7 @@ impl<'p> Solver<'p> {
     }
 
     /// Equilibrium at this angle and load, looked for from `guess`.
-    fn newton(
-        &mut self,
-        sought: Sought<'_>,
-        guess: &State,
-        work: &mut WorkLimit,
-    ) -> Result<(State, Increment), SolveError> {
+    fn newton(&mut self, sought: Sought<'_>, guess: &State, work: &mut WorkLimit) -> Solved {
         let Sought { generator_rad, torque_n_m, stage, .. } = sought;
         let settings = &self.problem.settings;
         let mut convergence = Convergence::new(stage.tolerance(settings), stage.most_iterations(settings));
@@ -578,7 +566,6 @@ impl<'p> Solver<'p> {
     fn assemble_holding(&mut self, state: &State, torque_n_m: f64, residual: &mut Unbalance) {
         let problem = self.problem;
         let width = self.border.width;
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let load = problem.per_width(torque_n_m);
         let (drag, drag_stiffness) = problem.drag_torque(state.output_rad - state.drag_anchor_rad);
         residual.drag_torque = drag;

@@ -18,6 +18,7 @@
 //! by GMRES (Saad and Schultz 1986), one solve with the factor of K an iteration.
 
 use crate::contact::SlipPoint;
+use crate::fem::dot;
 
 use super::step::{BORDERS, OUTPUT};
 
@@ -105,10 +106,6 @@ impl Slipping {
         solve(&mut x)?;
         possible.then_some(x)
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Solves `A y = b` from nothing, as well as a few Krylov vectors can.

@@ -1,5 +1,7 @@
 //! Out-of-balance forces, and the step that takes them away.
 
+use crate::fem::dot;
+
 use super::state::State;
 use super::waves::MOST_WAVES;
 
@@ -81,15 +83,13 @@ pub(super) struct NewtonStep {
 impl NewtonStep {
     /// Work of the out-of-balance forces along the step.
     pub(crate) fn work(&self, residual: &Unbalance) -> f64 {
-        residual.force.iter().zip(&self.free).map(|(f, d)| f * d).sum::<f64>()
-            + residual.border[OUTPUT] * self.border[OUTPUT]
+        dot(&residual.force, &self.free) + residual.border[OUTPUT] * self.border[OUTPUT]
     }
 
     /// Scalar product of displacements (mm²), the turn of the output counted at a radius.
     fn dot(&self, other: &NewtonStep) -> f64 {
         const RADIUS: f64 = 50.0;
-        let nodes = self.free.iter().zip(&other.free).map(|(a, b)| a * b).sum::<f64>();
-        nodes + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
+        dot(&self.free, &other.free) + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
     }
 
     fn add(&mut self, factor: f64, other: &NewtonStep) {
