@@ -255,6 +255,7 @@ impl DriveReader<'_> {
             if ["base", "name", "extension", "data_sheet"].contains(&section) {
                 continue;
             }
+            let sections = || fields::SECTIONS.iter().map(|(name, _)| *name);
             if !sections().any(|known| known == section) {
                 let known = || sections().chain(["base", "name", "data_sheet"]);
                 let keys: Vec<&str> = fields::ALL.iter().map(|field| field.path).collect();
@@ -346,15 +347,6 @@ fn apart(text: &str) -> Vec<&str> {
     parts
 }
 
-fn sections() -> impl Iterator<Item = &'static str> {
-    let mut last = "";
-    fields::ALL.iter().map(|field| field.split().0).filter(move |&section| {
-        let new = section != last;
-        last = section;
-        new
-    })
-}
-
 /// Message for a path that is no field.
 fn unknown_path(path: &str) -> String {
     let section = path.split_once('.').map_or("", |(section, _)| section);
@@ -363,7 +355,7 @@ fn unknown_path(path: &str) -> String {
     let known: Vec<&str> =
         fields::ALL.iter().map(Field::split).filter(|(s, _)| *s == section).map(|(_, key)| key).collect();
     if known.is_empty() {
-        let sections: Vec<&str> = sections().collect();
+        let sections: Vec<&str> = fields::SECTIONS.iter().map(|(name, _)| *name).collect();
         return format!("unknown key{hint}; allowed: SECTION.KEY, sections are {}", sections.join(", "));
     }
     format!("unknown key{hint}; allowed: {}", known.join(", "))

@@ -108,7 +108,7 @@ impl GeneratorOutline {
                         "{} mm is too large for the {kind} generator in a bore of radius {:.3} mm: the rollers would \
                          overlap; allowed: below {:.3} mm",
                         2.0 * radius,
-                        radius_of_bore(&neutral, offset),
+                        neutral.radius_mm() - offset,
                         2.0 * apart
                     ),
                 )
@@ -337,10 +337,6 @@ fn least(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         }
     }
     f(0.5 * (low + high))
-}
-
-fn radius_of_bore(neutral: &NeutralCurve, offset: f64) -> f64 {
-    neutral.radius_mm() - offset
 }
 
 #[cfg(test)]

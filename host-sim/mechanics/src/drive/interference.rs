@@ -51,18 +51,12 @@ impl Side {
 
     /// +1 or −1.
     pub fn sign(self) -> f64 {
-        match self {
-            Side::Plus => 1.0,
-            Side::Minus => -1.0,
-        }
+        if self == Side::Plus { 1.0 } else { -1.0 }
     }
 
     /// 0 or 1.
     pub fn index(self) -> usize {
-        match self {
-            Side::Plus => 0,
-            Side::Minus => 1,
-        }
+        self as usize
     }
 }
 
@@ -93,10 +87,7 @@ fn piece_name<S: serde::Serializer>(piece: &PieceKind, serializer: S) -> Result<
 
 impl fmt::Display for FlankGap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let side = match self.side {
-            Side::Plus => "positive",
-            Side::Minus => "negative",
-        };
+        let side = if self.side == Side::Plus { "positive" } else { "negative" };
         let state = if self.gap_mm < 0.0 { "interferes by" } else { "clears by" };
         write!(
             f,
@@ -183,7 +174,7 @@ impl RigidMesh {
         let space_axis = phi * self.flexspline_teeth / self.circular_spline_teeth;
         let foot = rotate(position, (-space_axis).sin_cos());
         let (s, c) = (normal - space_axis).sin_cos();
-        let sign = if side == Side::Plus { 1.0 } else { -1.0 };
+        let sign = side.sign();
         let (_, space_tip) = self.space.root_and_tip_radius();
 
         let gap_at = |piece: &OutlinePiece, t: f64| -> Option<FlankGap> {
