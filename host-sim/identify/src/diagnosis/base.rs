@@ -13,7 +13,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flexspline::Table;
 use serde::{Deserialize, Serialize};
 
-use super::flank_lag::{behind, flank_lag};
 use super::rows::Rows;
 use crate::least_squares::FreeSpan;
 use crate::nominal::Nominal;
@@ -147,7 +146,7 @@ pub(crate) struct Base {
 /// The parameter that floats where angles are read at other instants than is known, s.
 pub const BETWEEN_READINGS: &str = "time between the readings";
 /// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as
-/// this time says. Beside the lag that the rows tell best (`flank_lag`) it is that lag to first order.
+/// this time says, to first order about [`FLANK_S`].
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
 /// The output goes from one flank to the other in some milliseconds. *Guess*.
 pub(super) const FLANK_S: f64 = 5e-3;
@@ -225,11 +224,8 @@ impl Base {
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         // No output is on its other flank at once.
         if rows.recorded.time {
-            let left: Vec<f64> =
-                rows.error.iter().zip(&prediction).map(|(error, predicted)| error - predicted).collect();
-            let lag_s = flank_lag(rows, &left, &flank, half_backlash);
-            let per_s = behind(rows, &flank, half_backlash, lag_s).into_iter().map(|arcsec| arcsec / lag_s);
-            add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
+            let per_s = behind(rows, &flank, half_backlash).into_iter().map(|arcsec| arcsec / FLANK_S);
+            add(CHANGE_OF_FLANK, per_s.collect(), FLANK_S);
         }
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
@@ -279,6 +275,20 @@ impl Base {
         }
         self.flank = flank;
     }
+}
+
+/// What the error lacks as the output follows a change of flank with a lag of [`FLANK_S`], arcsec.
+fn behind(rows: &Rows, flank: &[f64], half_backlash: f64) -> Vec<f64> {
+    let mut behind = vec![0.0; rows.len()];
+    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
+        let mut reached = flank[session.start];
+        for k in session.start + 1..session.end {
+            let passed = (rows.time[k] - rows.time[k - 1]).max(0.0);
+            reached += (flank[k] - reached) * (1.0 - (-passed / FLANK_S).exp());
+            behind[k] = half_backlash * (reached - flank[k]);
+        }
+    }
+    behind
 }
 
 /// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong
