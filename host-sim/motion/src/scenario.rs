@@ -2,8 +2,8 @@
 
 use core::f64::consts::TAU;
 
-pub use super::legs::Leg;
-use super::legs::{Aim, Walk};
+use super::legs::Walk;
+pub use super::legs::{Leg, Moment};
 use super::noise::NoiseSource;
 use super::servo::ServoSettings;
 
@@ -106,22 +106,6 @@ pub struct Scenario {
 
 /// Slowest low-pass of a torque known on the load, Hz (guess).
 const LEAST_HZ: f64 = 1.0;
-/// Target at one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moment {
-    /// Time, s.
-    pub time_s: f64,
-    /// Target of the output, rad, and its rate and acceleration.
-    pub target_rad: f64,
-    /// rad/s.
-    pub rate_rad_s: f64,
-    /// rad/s².
-    pub acceleration_rad_s2: f64,
-    /// Whether the target has moved at this rate for half a second.
-    pub steady: bool,
-    /// Torque on the load at the beginning of the tick, without gravity's, N·m, and at its end.
-    pub outside_n_m: [f64; 2],
-}
 
 impl Scenario {
     /// Time of the whole flight, s.
@@ -237,11 +221,9 @@ impl Iterator for Moments<'_> {
 
     fn next(&mut self) -> Option<Moment> {
         let Scenario { legs, acceleration_rad_s2, servo, .. } = self.scenario;
-        let aim = self.walk.next(legs, *acceleration_rad_s2, servo.tick_s)?;
-        let Aim { time_s, target_rad, rate_rad_s, acceleration_rad_s2, steady } = aim;
+        let moment = self.walk.next(legs, *acceleration_rad_s2, servo.tick_s)?;
         let before = self.outside_n_m;
         self.outside_n_m = self.outside();
-        let outside_n_m = [before, self.outside_n_m];
-        Some(Moment { time_s, target_rad, rate_rad_s, acceleration_rad_s2, steady, outside_n_m })
+        Some(Moment { outside_n_m: [before, self.outside_n_m], ..moment })
     }
 }

@@ -10,8 +10,8 @@ use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::animation::{Animation, AnimationError};
 use flexspline_report::drive_figures::{drive_figure, less_mean, sleeve_figure};
 use flexspline_report::page::{
-    ChartAxis, ChartSeries, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock,
-    PageQuantity, PageSection, PageTable, RichText, Status, significant,
+    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
+    Status, significant,
 };
 
 /// The page; `animations` are the drives in motion, without load.
@@ -30,7 +30,6 @@ pub fn page(r: &Reproduction, animations: Vec<Result<Animation, AnimationError>>
         title: format!("The paper's protocol with {}", r.drive),
         command_name: "reproduce",
         status,
-        also: Vec::new(),
         remarks,
         choices: GeneratorKind::ALL
             .map(|kind| Choice { id: kind.to_string(), name: kind.in_words().to_owned() })
@@ -41,6 +40,7 @@ pub fn page(r: &Reproduction, animations: Vec<Result<Animation, AnimationError>>
         animations,
         provenance: provenance.map(|(name, value)| (name.to_owned(), value)).into(),
         results: Map::from_iter([("reproduce".to_owned(), json!(r))]),
+        ..Page::default()
     }
 }
 
@@ -65,19 +65,15 @@ fn headline(r: &Reproduction) -> Headline {
     let [reproduced, not, inconsistent, untestable] = ClaimVerdict::ALL.map(|verdict| r.counts[verdict.into()]);
     let unloaded = GeneratorKind::ALL.into_iter().filter_map(|kind| standard(&r.runs, kind, 0.0)?.metrics.as_ref());
     let largest_arcmin = unloaded.map(largest).fold(0.0, f64::max);
-    Headline {
-        choice: None,
-        answer: RichText::new(format!(
-            "Of {} claims of the paper {reproduced} are reproduced, {not} are not, {inconsistent} contradict the paper \
-             itself and {untestable} cannot be tested: unloaded, a sound drive is off by half its clearance, \
-             {largest_arcmin:.1}′, not by {ERROR_CAM:.0}′ to {ERROR_FOUR_ROLLER:.0}′.",
-            r.claims.len()
-        )),
-        number: RichText::default().error(60.0 * largest_arcmin, 3),
-        number_is: format!(
-            "largest error of any of the four drives without load; the paper has up to {ERROR_FOUR_ROLLER:.1}′"
-        ),
-    }
+    let answer = format!(
+        "Of {} claims of the paper {reproduced} are reproduced, {not} are not, {inconsistent} contradict the paper \
+         itself and {untestable} cannot be tested: unloaded, a sound drive is off by half its clearance, \
+         {largest_arcmin:.1}′, not by {ERROR_CAM:.0}′ to {ERROR_FOUR_ROLLER:.0}′.",
+        r.claims.len()
+    );
+    let number_is =
+        format!("largest error of any of the four drives without load; the paper has up to {ERROR_FOUR_ROLLER:.1}′");
+    Headline::new(answer.into(), RichText::arcsec(60.0 * largest_arcmin, 3), number_is)
 }
 
 /// Numbers with their bounds.
@@ -103,35 +99,21 @@ fn claims(r: &Reproduction) -> PageSection {
         ]
     };
     let header = ["Claim", "The paper", "Verdict", "Its numbers", "Our numbers", "Metric"];
-    let table = PageTable {
-        caption: "Claims of the paper in its order".into(),
-        header: header.map(str::to_owned).into(),
-        rows: r.claims.iter().map(row).collect(),
-    };
+    let table = PageBlock::table("Claims of the paper in its order", &header, r.claims.iter().map(row).collect());
     let blocks = vec![
         PageBlock::paragraph(
             "The verdict follows from the bounds alone. The paper gives no tooth sizes: sizes count as reproduced \
              within a quarter, ranks where the gap exceeds three times what mesh, increment and penalty move it by. A \
              number of the paper out of its bounds is an inconsistency.",
         ),
-        PageBlock::Table { choice: None, table },
+        table,
         PageBlock::paragraph(
             "A sound drive repeats its error with every tooth pitch and loses half its clearance, whatever deforms the \
              rim. The clearance of HHD-95 was chosen to give the cam a backlash near 1′: that its size is the paper's \
              is no evidence, the difference of the generators is.",
         ),
     ];
-    PageSection { id: "claims".into(), title: "Claim by claim".into(), detail: Detail::Summary, blocks }
-}
-
-fn error_figure(id: &str, title: &str, caption: &str, x: ChartAxis, charts: Vec<(String, Lines)>) -> PageBlock {
-    PageBlock::Figure(Figure {
-        id: id.into(),
-        title: title.into(),
-        caption: RichText::new(caption),
-        alt: title.into(),
-        body: FigureBody::Lines { x, y: ChartAxis::new("Output error", PageQuantity::Error), charts },
-    })
+    PageSection::new("claims", "Claim by claim", Detail::Summary, blocks)
 }
 
 /// Error of the unloaded runs over the generator angle, degrees and arcsec, each in a colour.
@@ -141,9 +123,8 @@ fn along(r: &Reproduction) -> Lines {
         let (out, back) = standard(&r.runs, kind, 0.0).map_or(Default::default(), |run| both_ways(&run.rows));
         for (way, mark, rows) in [("forward", Mark::Line, out), ("back", Mark::Dashed, back)] {
             let point = |row: &Row| [row.generator_rad.to_degrees(), row.error_arcsec];
-            let mut points: Vec<[f64; 2]> = rows.iter().map(point).collect();
-            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            lines.series.push(ChartSeries { name: format!("{}, {way}", kind.in_words()), mark, colour, points });
+            let name = format!("{}, {way}", kind.in_words());
+            lines.series.push(ChartSeries::sorted(name, mark, colour, rows.iter().map(point).collect()));
         }
     }
     lines.series.retain(|series| !series.points.is_empty());
@@ -151,33 +132,33 @@ fn along(r: &Reproduction) -> Lines {
 }
 
 fn errors(r: &Reproduction, animations: &[Animation]) -> PageSection {
+    let error = || ChartAxis::new("Output error", PageQuantity::Error);
     let mut blocks = Vec::new();
     if !animations.is_empty() {
         let ripple = |a: &Animation| {
-            let series =
-                ChartSeries { name: "no load, forward".into(), mark: Mark::Line, colour: 0, points: less_mean(a) };
-            (a.kind.to_string(), Lines { series: vec![series], ..Lines::default() })
+            let series = ChartSeries::new("no load, forward", Mark::Line, 0, less_mean(a));
+            (a.kind.to_string(), Lines::of(vec![series]))
         };
         blocks.push(PageBlock::Figure(drive_figure("no load, turning forward")));
-        blocks.push(error_figure(
+        blocks.push(PageBlock::lines(
             "ripple",
             "Error over one tooth pitch, less its mean",
             "The states of figure 1, after start-up. This repeats with every tooth pitch, 59.8 times in the paper's 2 \
              rad.",
-            ChartAxis::linked("Generator from the beginning of a pitch"),
+            [ChartAxis::linked("Generator from the beginning of a pitch"), error()],
             animations.iter().map(ripple).collect(),
         ));
     }
-    blocks.push(error_figure(
+    blocks.push(PageBlock::lines(
         "errors",
         "Error of the four generators: the paper's figures 12 and 13",
-        &format!(
+        format!(
             "Output angle less generator angle over the ratio, no load, zero where the drive was deformed, the output \
              in the middle of its clearance: forward to +1 rad, then back to −1 rad (dashed). The paper has \
              {ERROR_CAM:.1}′ (cam), {ERROR_DOUBLE_DISC:.1}′ (double disc), {ERROR_FOUR_ROLLER:.1}′ (four-roller).",
         ),
-        ChartAxis::new("Generator", PageQuantity::Degree),
-        vec![(EVERY_CHOICE.to_owned(), along(r))],
+        [ChartAxis::new("Generator", PageQuantity::Degree), error()],
+        along(r).for_every_choice(),
     ));
     blocks.extend(animations.iter().any(|a| a.sleeve.is_some()).then(|| PageBlock::Figure(sleeve_figure())));
     let held = r
@@ -192,5 +173,5 @@ fn errors(r: &Reproduction, animations: &[Animation]) -> PageSection {
          nodes: that its errors come from there is a suspicion.",
         held.collect::<Vec<_>>().join(", ")
     )));
-    PageSection { id: "errors-of-generators".into(), title: "The errors".into(), detail: Detail::Summary, blocks }
+    PageSection::new("errors-of-generators", "The errors", Detail::Summary, blocks)
 }
