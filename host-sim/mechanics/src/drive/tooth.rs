@@ -23,6 +23,7 @@
 
 use super::arcs::ArcChain;
 use super::error::DriveError;
+use super::interference::halved;
 use super::s_tooth;
 use super::sleeve::Profile;
 use super::spec::Drive;
@@ -426,18 +427,11 @@ impl WheelNumbers {
                     x.hypot(y) - distance
                 };
                 // The parallel curve grows in radius where the flank does, unless the corner is rounder than the flank.
-                let (mut low, mut high) = (-rho, chain.length() + rho);
+                let (low, high) = (-rho, chain.length() + rho);
                 if beyond(low) >= 0.0 || beyond(high) <= 0.0 {
                     return Err(self.refuse(field, rho, &format!("meets no flank at the circle of {radius:.4} mm")));
                 }
-                for _ in 0..60 {
-                    let middle = 0.5 * (low + high);
-                    if beyond(middle) > 0.0 {
-                        high = middle;
-                    } else {
-                        low = middle;
-                    }
-                }
+                let [low, _] = halved(low, high, |s| beyond(s) <= 0.0);
                 let (centre, t) = (offset(low), chain.tangent(low));
                 Ok(Corner { centre, angle: centre[1].atan2(centre[0]), along: low, direction: t[1].atan2(t[0]) })
             }
