@@ -15,6 +15,8 @@ use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, GeneratorOut
 const LARGEST_DRIVE: u64 = 1 << 20;
 /// Intervals to a piece of a tooth outline: 0.1 mm, a pixel of a close view (a guess).
 const POINTS_PER_PIECE: usize = 6;
+/// Intervals of a curve of the generator: a guess, some 1 mm.
+const POINTS_OF_A_CURVE: usize = 48;
 /// Stations around the rim at which the wave is given; a browser draws straight lines between. A guess.
 const STATIONS: usize = 720;
 
@@ -167,18 +169,12 @@ fn words(error: &DriveError, path: &str) -> String {
 fn draw(drive: &Drive, kind: GeneratorKind, gaps: bool) -> Result<Drawing, DriveError> {
     let points = outlines(drive, kind, POINTS_PER_PIECE)?;
     let of = |part: &str| points.iter().filter(|p| p.part == part).map(|p| [p.x_mm, p.y_mm]).collect::<Vec<_>>();
-    let mut generator: Vec<Vec<[f64; 2]>> = Vec::new();
-    let mut last = "";
-    for point in points.iter().filter(|point| point.part == "generator") {
-        if point.piece != last || generator.is_empty() {
-            last = &point.piece;
-            generator.push(Vec::new());
-        }
-        if let Some(curve) = generator.last_mut() {
-            curve.push([point.x_mm, point.y_mm]);
-        }
-    }
     let outline = GeneratorOutline::new(drive, kind)?;
+    let closed = |mut curve: Vec<[f64; 2]>| {
+        curve.extend(curve.first().copied());
+        curve
+    };
+    let generator = outline.polyline(POINTS_OF_A_CURVE).into_iter().map(closed).collect();
     let wave = (0..STATIONS)
         .map(|k| {
             let ([x, y], normal) = outline.neutral().position(std::f64::consts::TAU * k as f64 / STATIONS as f64);
