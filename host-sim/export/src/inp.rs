@@ -137,11 +137,7 @@ pub struct EquationTerm {
 }
 
 /// `sum of coefficient times displacement = 0`; the first term is the dependent one.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Equation {
-    /// Its terms.
-    pub terms: Vec<EquationTerm>,
-}
+pub type Equation = Vec<EquationTerm>;
 
 /// A face of an element: element number and face 1 to 4, face e running from corner e to the next.
 pub type Face = (usize, usize);
@@ -309,13 +305,11 @@ impl Deck {
             let [x, y] = mesh.nodes[node - 1 - nodes_before];
             let r = x.hypot(y);
             for (dof, turned, along) in [(1, -y, x), (2, x, y)] {
-                self.equations.push(Equation {
-                    terms: vec![
-                        EquationTerm { node, dof, coefficient: 1.0 },
-                        EquationTerm { node: self.output, dof: 1, coefficient: -turned },
-                        EquationTerm { node: self.output, dof: 2, coefficient: -along / r },
-                    ],
-                });
+                self.equations.push(vec![
+                    EquationTerm { node, dof, coefficient: 1.0 },
+                    EquationTerm { node: self.output, dof: 1, coefficient: -turned },
+                    EquationTerm { node: self.output, dof: 2, coefficient: -along / r },
+                ]);
             }
         }
         self.springs.push(GroundSpring {
@@ -410,7 +404,7 @@ impl Deck {
                 writeln!(out, "{element}, S{face}")?;
             }
         }
-        for Equation { terms } in &self.equations {
+        for terms in &self.equations {
             equation(out, terms.iter().copied())?;
         }
         Ok(())

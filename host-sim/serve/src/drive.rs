@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::folder::{Folder, FolderError};
 use crate::work::DriveAsked;
 use flexspline_export::outlines;
-use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, GeneratorOutline, ListedField, RigidMesh};
+use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, GeneratorOutline, ListedField, Problem, RigidMesh};
 
 /// Bytes of a drive file, at most: those with an error for each of 2000 teeth have 50 kB.
 const LARGEST_DRIVE: u64 = 1 << 20;
@@ -40,15 +40,6 @@ pub fn read(folder: &Folder, name: &str) -> Result<Drive, ReadError> {
     Ok(Drive::from_toml(name, &String::from_utf8_lossy(&bytes))?)
 }
 
-/// One thing that is wrong.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct RefusedField {
-    /// The field, or nothing if none is to blame.
-    pub field: String,
-    /// The value found and what is allowed.
-    pub what: String,
-}
-
 /// A drive as a page shows it.
 #[derive(Debug, Serialize)]
 pub struct DriveShown {
@@ -61,7 +52,7 @@ pub struct DriveShown {
     /// Its fields.
     pub fields: Vec<ListedField>,
     /// Its faults; none of a drive that is whole.
-    pub problems: Vec<RefusedField>,
+    pub problems: Vec<Problem>,
     /// Cautions on a drive that is whole.
     pub cautions: Vec<String>,
     /// Its drawing; none of a drive that is not whole.
@@ -116,13 +107,13 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
             Ok(()) => good.push(set.as_str()),
             // Two fields that fit one another alone, as teeth of both wheels do.
             Err(_) if from.with_sets(sets.iter().map(String::as_str)).is_ok() => good.push(set.as_str()),
-            Err(what) => problems.push(RefusedField { field: path.clone(), what }),
+            Err(what) => problems.push(Problem::of(path, what)),
         }
     }
     let drive = match from.with_sets(good.iter().copied()) {
         Ok(drive) => Some(drive),
         Err(error) => {
-            problems.extend(error.problems.into_iter().map(|p| RefusedField { field: p.field, what: p.what }));
+            problems.extend(error.problems);
             None
         }
     };
@@ -132,11 +123,11 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
     let drawing = match drawn {
         Some(Ok(Ok(drawing))) => Some(drawing),
         Some(Ok(Err(error))) => {
-            problems.extend(error.problems.into_iter().map(|p| RefusedField { field: p.field, what: p.what }));
+            problems.extend(error.problems);
             None
         }
         Some(Err(_)) => {
-            problems.push(RefusedField { field: String::new(), what: "these sizes make no drawing".to_owned() });
+            problems.push(Problem::of("", "these sizes make no drawing"));
             None
         }
         None => None,
@@ -160,7 +151,7 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
 
 /// Fault of one field; of a whole drive that does not fit, all of it.
 fn words(error: &DriveError, path: &str) -> String {
-    let of = |p: &flexspline_mechanics::drive::Problem| {
+    let of = |p: &Problem| {
         if p.field.is_empty() || p.field == path { p.what.clone() } else { format!("{}: {}", p.field, p.what) }
     };
     error.problems.iter().map(of).collect::<Vec<_>>().join("; ")
