@@ -8,15 +8,17 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
 
+use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::suggest::{did_you_mean, likeliest_path, question};
 
 /// One thing that is wrong with a file, or with what it describes.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Problem {
-    /// File and line (`drive.toml:12`), or `--set`; empty for a drive made in a program.
+    /// File and line (`drive.toml:12`), or `--set`; empty for a drive made in a program. A page asks for fields.
+    #[serde(skip)]
     pub place: String,
     /// Path of the field as it stands in the file, `flexspline.teeth`; empty if no field is to blame.
     pub field: String,

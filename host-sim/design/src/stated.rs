@@ -283,8 +283,46 @@ pub struct SheetBeside {
     pub why: Option<String>,
 }
 
-/// Name, stated, computed, scatter of units in percent, what is computed.
-type Figure = (&'static str, Option<f64>, Option<f64>, Option<f64>, &'static str);
+/// Of a figure: its name for readers and its unit, the loads of the sheet that it is for, and what is computed.
+fn described(figure: &'static str) -> (&'static str, &'static str, &'static [&'static str], &'static str) {
+    match figure {
+        "k1_n_m_per_rad" => ("K1", "N·m/rad", &["t1_n_m"], "secant from first contact to T1"),
+        "k2_n_m_per_rad" => ("K2", "N·m/rad", &["t1_n_m", "t2_n_m"], "secant from T1 to T2"),
+        "k3_n_m_per_rad" => ("K3", "N·m/rad", &["t2_n_m", RATED], "secant from T2 to the rated torque"),
+        "hysteresis_loss_arcmin" => (
+            "Hysteresis loss",
+            "′",
+            &[RATED],
+            "clearance and friction of the flanks; friction elsewhere is no part of it",
+        ),
+        "lost_motion_arcmin" => {
+            ("Lost motion", "′", &[RATED], "between 4 % of the rated torque either way, clearance included")
+        }
+        "ratcheting_torque_n_m" => (
+            "Ratcheting torque",
+            "N·m",
+            &[],
+            "largest torque at which equilibrium was found, looked for up to the stated one: 1 is held",
+        ),
+        "starting_torque_n_m" => (
+            "Starting torque",
+            "N·m",
+            &[],
+            "drag of the output and friction of the flanks; bearings and seals of the generator are no part of it",
+        ),
+        "accuracy_arcmin" => (
+            "Transmission accuracy",
+            "′",
+            &[RATED],
+            "over a tooth pitch under the rated torque; what errors of single teeth and axes add over a turn is no \
+             part of it",
+        ),
+        other => (other, "", &[], ""),
+    }
+}
+
+/// The key of the load that most figures are for.
+const RATED: &str = "rated_torque_n_m";
 
 /// Computes what is stated, at a temperature.
 pub fn beside(
@@ -309,55 +347,25 @@ pub fn beside(
     // The error of tips that clash is no accuracy of the drive.
     let clashes = sheet.tip_contact.is_some_and(|tips| tips.counts());
     let accuracy = arcmin(sheet.kinematic_error_pp_arcsec.filter(|_| !clashes));
-    let scatter = stated.unit_scatter_percent;
-    let figures: [Figure; 8] = [
-        ("k1_n_m_per_rad", stated.k1_n_m_per_rad, sheet.k1_n_m_per_rad, scatter, "secant from first contact to T1"),
-        ("k2_n_m_per_rad", stated.k2_n_m_per_rad, sheet.k2_n_m_per_rad, scatter, "secant from T1 to T2"),
-        ("k3_n_m_per_rad", stated.k3_n_m_per_rad, sheet.k3_n_m_per_rad, scatter, "secant from T2 to the rated torque"),
-        (
-            "hysteresis_loss_arcmin",
-            stated.hysteresis_loss_arcmin,
-            loop_arcmin,
-            None,
-            "clearance and friction of the flanks; friction elsewhere is no part of it",
-        ),
-        (
-            "lost_motion_arcmin",
-            stated.lost_motion_arcmin,
-            arcmin(sheet.lost_motion_arcsec),
-            None,
-            "between 4 % of the rated torque either way, clearance included",
-        ),
-        (
-            "ratcheting_torque_n_m",
-            stated.ratcheting_torque_n_m,
-            held_n_m,
-            None,
-            "largest torque at which equilibrium was found, looked for up to the stated one: 1 is held",
-        ),
-        (
-            "starting_torque_n_m",
-            stated.starting_torque_n_m,
-            starting_n_m,
-            None,
-            "drag of the output and friction of the flanks; bearings and seals of the generator are no part of it",
-        ),
-        (
-            "accuracy_arcmin",
-            stated.accuracy_arcmin,
-            accuracy,
-            None,
-            "over a tooth pitch under the rated torque; what errors of single teeth and axes add over a turn is no \
-             part of it",
-        ),
+    let figures = [
+        ("k1_n_m_per_rad", stated.k1_n_m_per_rad, sheet.k1_n_m_per_rad),
+        ("k2_n_m_per_rad", stated.k2_n_m_per_rad, sheet.k2_n_m_per_rad),
+        ("k3_n_m_per_rad", stated.k3_n_m_per_rad, sheet.k3_n_m_per_rad),
+        ("hysteresis_loss_arcmin", stated.hysteresis_loss_arcmin, loop_arcmin),
+        ("lost_motion_arcmin", stated.lost_motion_arcmin, arcmin(sheet.lost_motion_arcsec)),
+        ("ratcheting_torque_n_m", stated.ratcheting_torque_n_m, held_n_m),
+        ("starting_torque_n_m", stated.starting_torque_n_m, starting_n_m),
+        ("accuracy_arcmin", stated.accuracy_arcmin, accuracy),
     ];
     let beside = figures
         .into_iter()
-        .filter_map(|(figure, stated, computed, scatter, words)| {
-            let stated = stated?;
+        .filter_map(|(figure, value, computed)| {
+            let scatter = stated.unit_scatter_percent.filter(|_| figure.starts_with('k'));
+            let stated = value?;
             let ratio = computed.map(|computed| computed / stated).filter(|ratio| ratio.is_finite());
             let within_scatter = ratio.zip(scatter).map(|(ratio, percent)| (ratio - 1.0).abs() <= 1e-2 * percent);
             let reason = ratio.filter(|ratio| *ratio > 1.0).and_then(|_| why_stiffer(drive, figure));
+            let (_, _, _, words) = described(figure);
             Some(Beside { figure, stated, computed, ratio, within_scatter, words, reason })
         })
         .collect();
@@ -528,29 +536,14 @@ impl SheetBeside {
 impl Beside {
     /// Name and unit of the figure.
     pub fn in_words(&self) -> (&'static str, &'static str) {
-        match self.figure {
-            "k1_n_m_per_rad" => ("K1", "N·m/rad"),
-            "k2_n_m_per_rad" => ("K2", "N·m/rad"),
-            "k3_n_m_per_rad" => ("K3", "N·m/rad"),
-            "hysteresis_loss_arcmin" => ("Hysteresis loss", "′"),
-            "lost_motion_arcmin" => ("Lost motion", "′"),
-            "ratcheting_torque_n_m" => ("Ratcheting torque", "N·m"),
-            "starting_torque_n_m" => ("Starting torque", "N·m"),
-            "accuracy_arcmin" => ("Transmission accuracy", "′"),
-            other => (other, ""),
-        }
+        let (name, unit, ..) = described(self.figure);
+        (name, unit)
     }
 
     /// Meaning of the figure, whether it depends on assumed loads, and whether it is within the scatter of units.
     pub fn remark(&self, of: &SheetBeside) -> String {
         let percent = of.stated.unit_scatter_percent.unwrap_or(0.0);
-        let hangs_on = match self.figure {
-            "k1_n_m_per_rad" => &["t1_n_m"][..],
-            "k2_n_m_per_rad" => &["t1_n_m", "t2_n_m"],
-            "k3_n_m_per_rad" => &["t2_n_m", "rated_torque_n_m"],
-            "hysteresis_loss_arcmin" | "lost_motion_arcmin" | "accuracy_arcmin" => &["rated_torque_n_m"],
-            _ => &[],
-        };
+        let (_, _, hangs_on, _) = described(self.figure);
         let assumed = if hangs_on.iter().any(|key| of.assumed.contains(key)) { "at assumed loads; " } else { "" };
         let scatter = match self.within_scatter {
             Some(true) => format!("; within the ±{percent:.0} % that units scatter"),

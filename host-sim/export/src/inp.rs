@@ -137,11 +137,7 @@ pub struct EquationTerm {
 }
 
 /// `sum of coefficient times displacement = 0`; the first term is the dependent one.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Equation {
-    /// Its terms.
-    pub terms: Vec<EquationTerm>,
-}
+pub type Equation = Vec<EquationTerm>;
 
 /// A face of an element: element number and face 1 to 4, face e running from corner e to the next.
 pub type Face = (usize, usize);
@@ -309,13 +305,11 @@ impl Deck {
             let [x, y] = mesh.nodes[node - 1 - nodes_before];
             let r = x.hypot(y);
             for (dof, turned, along) in [(1, -y, x), (2, x, y)] {
-                self.equations.push(Equation {
-                    terms: vec![
-                        EquationTerm { node, dof, coefficient: 1.0 },
-                        EquationTerm { node: self.output, dof: 1, coefficient: -turned },
-                        EquationTerm { node: self.output, dof: 2, coefficient: -along / r },
-                    ],
-                });
+                self.equations.push(vec![
+                    EquationTerm { node, dof, coefficient: 1.0 },
+                    EquationTerm { node: self.output, dof: 1, coefficient: -turned },
+                    EquationTerm { node: self.output, dof: 2, coefficient: -along / r },
+                ]);
             }
         }
         self.springs.push(GroundSpring {
@@ -410,7 +404,7 @@ impl Deck {
                 writeln!(out, "{element}, S{face}")?;
             }
         }
-        for Equation { terms } in &self.equations {
+        for terms in &self.equations {
             equation(out, terms.iter().copied())?;
         }
         Ok(())
@@ -444,11 +438,10 @@ impl Deck {
     }
 
     fn steps(&self) -> Vec<DeckStep> {
-        let loaded =
-            DeckStep { generator_rad: 0.0, output: DeckOutput::Loaded(self.load_per_mm), flanks: DeckFlanks::On };
+        let loaded = DeckStep { generator_rad: 0.0, output: DeckOutput::Loaded(self.load_per_mm), flanks: None };
         let mut steps = vec![
-            DeckStep { output: DeckOutput::Held(0.0), flanks: DeckFlanks::Removed, ..loaded },
-            DeckStep { output: DeckOutput::Held(self.bearing_turn_rad), flanks: DeckFlanks::Added, ..loaded },
+            DeckStep { output: DeckOutput::Held(0.0), flanks: Some("REMOVE"), ..loaded },
+            DeckStep { output: DeckOutput::Held(self.bearing_turn_rad), flanks: Some("ADD"), ..loaded },
         ];
         let turned = |k| DeckStep { generator_rad: k as f64 * self.settings.step_rad, ..loaded };
         let rollers = self.generator.is_rollers();
@@ -467,14 +460,9 @@ impl Deck {
         writeln!(out, "** step {}: generator at {} rad", k + 1, short(step.generator_rad))?;
         // One increment to a step; the program halves it where it has to. Where flanks meet it finds its way in less
         // than half the iterations from a first step of half the way: 22 for 55 with the cam on the coarse mesh.
-        let first = if step.flanks == DeckFlanks::Added { "0.5" } else { "1." };
+        let first = if step.flanks == Some("ADD") { "0.5" } else { "1." };
         writeln!(out, "*STEP, NLGEOM, INC=200\n*STATIC\n{first}, 1.")?;
-        let change = match step.flanks {
-            DeckFlanks::On => None,
-            DeckFlanks::Removed => Some("REMOVE"),
-            DeckFlanks::Added => Some("ADD"),
-        };
-        if let Some(change) = change {
+        if let Some(change) = step.flanks {
             writeln!(out, "*MODEL CHANGE, TYPE=CONTACT PAIR, {change}\n{fs_flanks}, {cs_flanks}")?;
         }
         writeln!(out, "*BOUNDARY, OP=NEW")?;
@@ -508,13 +496,6 @@ impl Deck {
 /// Names of [`Deck::surfaces`].
 const SURFACES: [&str; 4] = ["BORE_FACE", "FLEXSPLINE_FLANKS", "CIRCULAR_SPLINE_FLANKS", "GENERATOR_FACE"];
 
-#[derive(Clone, Copy, PartialEq)]
-enum DeckFlanks {
-    On,
-    Removed,
-    Added,
-}
-
 #[derive(Clone, Copy)]
 enum DeckOutput {
     /// At an angle, rad.
@@ -528,7 +509,8 @@ enum DeckOutput {
 struct DeckStep {
     generator_rad: f64,
     output: DeckOutput,
-    flanks: DeckFlanks,
+    /// Change of the contact of the flanks: `REMOVE`, `ADD`.
+    flanks: Option<&'static str>,
 }
 
 fn sign(x: f64) -> f64 {

@@ -19,7 +19,7 @@ use std::f64::consts::TAU;
 use std::io::{self, Write};
 
 use flexspline_design::simulate::stress::nodal_von_mises;
-use flexspline_mechanics::mesh::WheelMesh;
+use flexspline_mechanics::mesh::rotate;
 use flexspline_mechanics::stepping::{Problem, State};
 
 /// Type number of the 8-node quadrilateral.
@@ -37,22 +37,28 @@ pub struct VtuFrame {
 /// Writes the drive in a state.
 pub fn write_vtu(out: &mut dyn Write, problem: &Problem, state: &State) -> io::Result<()> {
     let state = &*problem.whole_state(state);
-    let wheels = [
-        MovedWheel::new(&problem.flexspline, &state.u, 0.0),
-        MovedWheel::new(&problem.circular_spline, &state.v, state.output_rad),
-    ];
     let whole =
         [("generator_rad", state.generator_rad), ("output_rad", state.output_rad), ("torque_n_m", state.torque_n_m)];
     let mut grid = CellGrid { whole: whole.to_vec(), part: "wheel", ..CellGrid::default() };
-    for (wheel, id) in wheels.iter().zip(0_u8..) {
+    let wheels = [
+        (&problem.flexspline, &state.u, 0.0, 0),
+        // Turned into the global frame.
+        (&problem.circular_spline, &state.v, state.output_rad, 1),
+    ];
+    for (mesh, field, turn_rad, id) in wheels {
         let first = grid.points.len() / 3;
-        grid.points.extend(wheel.positions());
-        grid.displacements.extend(wheel.displacements());
-        let stress = nodal_von_mises(wheel.mesh, &problem.material, wheel.field);
-        grid.von_mises.extend(stress.into_iter().map(|s| s as f32));
-        for (e, element) in wheel.mesh.elements.iter().enumerate() {
+        let turn = (turn_rad % TAU).sin_cos();
+        let global = |p: [f64; 2]| {
+            let [x, y] = rotate(p, turn);
+            [x as f32, y as f32, 0.0]
+        };
+        let (moved, _) = field.as_chunks::<2>();
+        grid.points.extend(mesh.nodes.iter().zip(moved).flat_map(|(x, d)| global([x[0] + d[0], x[1] + d[1]])));
+        grid.displacements.extend(moved.iter().flat_map(|d| global(*d)));
+        grid.von_mises.extend(nodal_von_mises(mesh, &problem.material, field).into_iter().map(|s| s as f32));
+        for (e, element) in mesh.elements.iter().enumerate() {
             grid.cell(&element.map(|n| first + n as usize), VTK_QUADRATIC_QUAD, id);
-            grid.sectors.push((e / wheel.mesh.elements_per_sector) as i32);
+            grid.sectors.push((e / mesh.elements_per_sector) as i32);
         }
     }
     grid.write(out)
@@ -136,34 +142,6 @@ pub fn write_pvd(out: &mut dyn Write, frames: &[VtuFrame]) -> io::Result<()> {
         writeln!(out, r#"<DataSet timestep="{step}" part="0" file="{file}"/>"#)?;
     }
     writeln!(out, "</Collection>\n</VTKFile>")
-}
-
-/// A wheel with its displacements, in a frame turned by `turn_rad`.
-struct MovedWheel<'a> {
-    mesh: &'a WheelMesh,
-    field: &'a [f64],
-    turn: (f64, f64),
-}
-
-impl<'a> MovedWheel<'a> {
-    fn new(mesh: &'a WheelMesh, field: &'a [f64], turn_rad: f64) -> Self {
-        MovedWheel { mesh, field, turn: (turn_rad % TAU).sin_cos() }
-    }
-
-    /// Turned into the global frame, as a point of space.
-    fn global(&self, x: f64, y: f64) -> [f32; 3] {
-        let (sin, cos) = self.turn;
-        [(cos * x - sin * y) as f32, (sin * x + cos * y) as f32, 0.0]
-    }
-
-    fn positions(&self) -> Vec<f32> {
-        let displaced = self.mesh.nodes.iter().zip(self.field.chunks_exact(2));
-        displaced.flat_map(|(x, d)| self.global(x[0] + d[0], x[1] + d[1])).collect()
-    }
-
-    fn displacements(&self) -> Vec<f32> {
-        self.field.chunks_exact(2).flat_map(|d| self.global(d[0], d[1])).collect()
-    }
 }
 
 fn vectors(out: &mut dyn Write, name: &str, values: &[f32]) -> io::Result<()> {

@@ -144,7 +144,7 @@ const AT_A_FRAME: f64 = 1e-6;
 /// animation.
 pub(crate) struct Passing {
     uniform: bool,
-    taken: Option<Taken>,
+    taken: Option<Animation>,
     sleeve: Option<Result<Option<SleeveView>, MeshError>>,
     /// The rows at the frames so far, one after the other.
     rows: Vec<Row>,
@@ -175,7 +175,7 @@ impl Passing {
             self.rows.clear();
         }
         self.sleeve.get_or_insert_with(|| SleeveView::of(now.problem, now.state, &row.face));
-        self.taken.get_or_insert_with(|| Taken::new(now.problem)).add(now.problem, now.state);
+        self.taken.get_or_insert_with(|| Animation::new(now.problem)).add(now.problem, now.state);
         self.rows.push(row.clone());
     }
 
@@ -184,15 +184,10 @@ impl Passing {
     /// # Errors
     /// The drive has no sleeve that can be shown.
     pub fn finish(self) -> Result<Option<Animation>, MeshError> {
-        let Some(mut taken) = self.taken.filter(|_| self.rows.len() == FRAMES) else { return Ok(None) };
-        taken.animation.sleeve = self.sleeve.transpose()?.flatten();
-        Ok(Some(taken.finish(self.rows)))
+        let Some(taken) = self.taken.filter(|_| self.rows.len() == FRAMES) else { return Ok(None) };
+        let sleeve = self.sleeve.transpose()?.flatten();
+        Ok(Some(Animation { sleeve, ..taken.finish(self.rows) }))
     }
-}
-
-/// Samples as they come in.
-struct Taken {
-    animation: Animation,
 }
 
 impl WheelMotion {
@@ -309,11 +304,12 @@ pub(super) fn flank_forces(problem: &Problem, state: &State, wanted: impl Fn(usi
     flanks.near_pairs(at, NEAR_MM).into_iter().filter(|pair| wanted(pair.tooth)).filter_map(of_pair).collect()
 }
 
-impl Taken {
-    fn new(problem: &Problem) -> Taken {
+/// Samples as they come in.
+impl Animation {
+    fn new(problem: &Problem) -> Animation {
         let both_even = problem.flexspline.teeth.is_multiple_of(2) && problem.circular_spline.teeth.is_multiple_of(2);
         let flexspline = WheelMotion::new(&problem.flexspline, both_even);
-        let animation = Animation {
+        Animation {
             kind: problem.kind,
             frames: FRAMES,
             torque_n_m: 0.0,
@@ -329,8 +325,7 @@ impl Taken {
             colour_end_mpa: 0.0,
             peak_mpa: 0.0,
             sleeve: None,
-        };
-        Taken { animation }
+        }
     }
 
     fn add(&mut self, problem: &Problem, state: &State) {
@@ -338,50 +333,37 @@ impl Taken {
         let whole = problem.whole_state(state);
         let stress = |mesh: &WheelMesh, field: &[f64]| nodal_von_mises(mesh, &problem.material, field);
         let (fs, cs) = (&problem.flexspline, &problem.circular_spline);
-        self.animation.flexspline.add(fs, &whole.u, &stress(fs, &whole.u), frame);
-        self.animation.circular_spline.add(cs, &whole.v, &stress(cs, &whole.v), frame);
-        let error = state.output_rad - state.generator_rad / self.animation.ratio;
-        self.animation.error_arcsec[frame.rem_euclid(FRAMES as i64) as usize] = error.to_degrees() * 3600.0;
-        self.add_flank_forces(problem, state, frame);
-        self.add_bore_forces(problem, state, frame);
-    }
-
-    /// Adds `values` to rows of the forces, for the tooth of the sector.
-    fn put(&mut self, row: usize, sector: usize, frame: i64, values: [f64; 2]) {
-        let (s, samples) = (self.animation.flexspline.sample(sector, frame), self.animation.flexspline.samples);
-        for (k, value) in values.into_iter().enumerate() {
-            self.animation.forces[(row + k) * samples + s] += value;
-        }
-    }
-
-    fn add_flank_forces(&mut self, problem: &Problem, state: &State, frame: i64) {
-        let sampled = self.animation.flexspline.sampled();
+        self.flexspline.add(fs, &whole.u, &stress(fs, &whole.u), frame);
+        self.circular_spline.add(cs, &whole.v, &stress(cs, &whole.v), frame);
+        let error = state.output_rad - state.generator_rad / self.ratio;
+        self.error_arcsec[frame.rem_euclid(FRAMES as i64) as usize] = error.to_degrees() * 3600.0;
+        let sampled = self.flexspline.sampled();
         for found in flank_forces(problem, state, |tooth| sampled.contains(&tooth)) {
             let row = if found.side == Side::Plus { 0 } else { 4 };
             self.put(row, found.tooth, frame, found.force_n);
             self.put(row + 2, found.tooth, frame, found.point_mm);
         }
-    }
-
-    fn add_bore_forces(&mut self, problem: &Problem, state: &State, frame: i64) {
-        let sampled = self.animation.flexspline.sampled().len();
-        for (sector, force) in bore_forces(problem, state, sampled).into_iter().enumerate() {
+        for (sector, force) in bore_forces(problem, state, sampled.len()).into_iter().enumerate() {
             self.put(8, sector, frame, force);
         }
     }
 
+    /// Adds `values` to rows of the forces, for the tooth of the sector.
+    fn put(&mut self, row: usize, sector: usize, frame: i64, values: [f64; 2]) {
+        let (s, samples) = (self.flexspline.sample(sector, frame), self.flexspline.samples);
+        for (k, value) in values.into_iter().enumerate() {
+            self.forces[(row + k) * samples + s] += value;
+        }
+    }
+
     fn finish(self, rows: Vec<Row>) -> Animation {
-        let mut animation = self.animation;
-        let mut all: Vec<f64> = [&animation.flexspline, &animation.circular_spline]
-            .iter()
-            .flat_map(|wheel| wheel.von_mises_mpa.iter().copied())
-            .collect();
+        let wheels = [&self.flexspline, &self.circular_spline];
+        let mut all: Vec<f64> = wheels.iter().flat_map(|wheel| wheel.von_mises_mpa.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
         let last = all.len() - 1;
-        animation.peak_mpa = all[last];
-        animation.colour_end_mpa = round_up(all[(last as f64 * COLOUR_SHARE) as usize]);
+        let (peak_mpa, colour_end_mpa) = (all[last], round_up(all[(last as f64 * COLOUR_SHARE) as usize]));
         let Row { torque_n_m, temperature_c, .. } = rows[0];
-        Animation { torque_n_m, temperature_c, rows, ..animation }
+        Animation { torque_n_m, temperature_c, rows, peak_mpa, colour_end_mpa, ..self }
     }
 }
 

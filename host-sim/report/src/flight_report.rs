@@ -53,10 +53,6 @@ fn headline(results: &Results) -> Headline {
     Headline::new(answer, RichText::arcsec(rms.compensated, 3), "output less target, rms")
 }
 
-fn cells(of: &ByController<f64>) -> [f64; 5] {
-    [of.none, of.fourier, of.fourier_by_direction, of.compensated, of.ideal]
-}
-
 /// Amplitude up to which a spectrum is linear, arcsec: lines that no pointing budget counts. A guess.
 const FAINT_ARCSEC: f64 = 0.01;
 
@@ -69,8 +65,8 @@ fn drawn(points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<ChartSeries> {
 }
 
 fn tracking(flight: &Flight, results: &Results) -> PageSection {
-    let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(cells);
-    let settles = results.settle_s.as_ref().map(cells);
+    let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(ByController::all);
+    let settles = results.settle_s.as_ref().map(ByController::all);
     let row = |(k, name): (usize, &&str)| {
         let [rms, largest, ripple] = columns.map(|column| column[k]);
         vec![

@@ -9,12 +9,14 @@ use serde::Serialize;
 use crate::folder::{Folder, FolderError};
 use crate::work::DriveAsked;
 use flexspline_export::outlines;
-use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, GeneratorOutline, ListedField, RigidMesh};
+use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, GeneratorOutline, ListedField, Problem, RigidMesh};
 
 /// Bytes of a drive file, at most: those with an error for each of 2000 teeth have 50 kB.
 const LARGEST_DRIVE: u64 = 1 << 20;
 /// Intervals to a piece of a tooth outline: 0.1 mm, a pixel of a close view (a guess).
 const POINTS_PER_PIECE: usize = 6;
+/// Intervals of a curve of the generator: a guess, some 1 mm.
+const POINTS_OF_A_CURVE: usize = 48;
 /// Stations around the rim at which the wave is given; a browser draws straight lines between. A guess.
 const STATIONS: usize = 720;
 
@@ -38,15 +40,6 @@ pub fn read(folder: &Folder, name: &str) -> Result<Drive, ReadError> {
     Ok(Drive::from_toml(name, &String::from_utf8_lossy(&bytes))?)
 }
 
-/// One thing that is wrong.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct RefusedField {
-    /// The field, or nothing if none is to blame.
-    pub field: String,
-    /// The value found and what is allowed.
-    pub what: String,
-}
-
 /// A drive as a page shows it.
 #[derive(Debug, Serialize)]
 pub struct DriveShown {
@@ -59,7 +52,7 @@ pub struct DriveShown {
     /// Its fields.
     pub fields: Vec<ListedField>,
     /// Its faults; none of a drive that is whole.
-    pub problems: Vec<RefusedField>,
+    pub problems: Vec<Problem>,
     /// Cautions on a drive that is whole.
     pub cautions: Vec<String>,
     /// Its drawing; none of a drive that is not whole.
@@ -114,13 +107,13 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
             Ok(()) => good.push(set.as_str()),
             // Two fields that fit one another alone, as teeth of both wheels do.
             Err(_) if from.with_sets(sets.iter().map(String::as_str)).is_ok() => good.push(set.as_str()),
-            Err(what) => problems.push(RefusedField { field: path.clone(), what }),
+            Err(what) => problems.push(Problem::of(path, what)),
         }
     }
     let drive = match from.with_sets(good.iter().copied()) {
         Ok(drive) => Some(drive),
         Err(error) => {
-            problems.extend(error.problems.into_iter().map(|p| RefusedField { field: p.field, what: p.what }));
+            problems.extend(error.problems);
             None
         }
     };
@@ -130,11 +123,11 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
     let drawing = match drawn {
         Some(Ok(Ok(drawing))) => Some(drawing),
         Some(Ok(Err(error))) => {
-            problems.extend(error.problems.into_iter().map(|p| RefusedField { field: p.field, what: p.what }));
+            problems.extend(error.problems);
             None
         }
         Some(Err(_)) => {
-            problems.push(RefusedField { field: String::new(), what: "these sizes make no drawing".to_owned() });
+            problems.push(Problem::of("", "these sizes make no drawing"));
             None
         }
         None => None,
@@ -158,7 +151,7 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
 
 /// Fault of one field; of a whole drive that does not fit, all of it.
 fn words(error: &DriveError, path: &str) -> String {
-    let of = |p: &flexspline_mechanics::drive::Problem| {
+    let of = |p: &Problem| {
         if p.field.is_empty() || p.field == path { p.what.clone() } else { format!("{}: {}", p.field, p.what) }
     };
     error.problems.iter().map(of).collect::<Vec<_>>().join("; ")
@@ -167,18 +160,12 @@ fn words(error: &DriveError, path: &str) -> String {
 fn draw(drive: &Drive, kind: GeneratorKind, gaps: bool) -> Result<Drawing, DriveError> {
     let points = outlines(drive, kind, POINTS_PER_PIECE)?;
     let of = |part: &str| points.iter().filter(|p| p.part == part).map(|p| [p.x_mm, p.y_mm]).collect::<Vec<_>>();
-    let mut generator: Vec<Vec<[f64; 2]>> = Vec::new();
-    let mut last = "";
-    for point in points.iter().filter(|point| point.part == "generator") {
-        if point.piece != last || generator.is_empty() {
-            last = &point.piece;
-            generator.push(Vec::new());
-        }
-        if let Some(curve) = generator.last_mut() {
-            curve.push([point.x_mm, point.y_mm]);
-        }
-    }
     let outline = GeneratorOutline::new(drive, kind)?;
+    let closed = |mut curve: Vec<[f64; 2]>| {
+        curve.extend(curve.first().copied());
+        curve
+    };
+    let generator = outline.polyline(POINTS_OF_A_CURVE).into_iter().map(closed).collect();
     let wave = (0..STATIONS)
         .map(|k| {
             let ([x, y], normal) = outline.neutral().position(std::f64::consts::TAU * k as f64 / STATIONS as f64);

@@ -136,6 +136,9 @@ impl Format {
     }
 }
 
+/// An option, whether it is given, and the formats that have a use for it.
+pub(super) type Given = (&'static str, bool, &'static [Format]);
+
 /// Result with `--json`.
 #[derive(Serialize)]
 struct ExportReport {
@@ -171,11 +174,11 @@ impl Export {
         context.print(&ExportReport { schema_version: 1, written }, || text)
     }
 
-    /// Refuses options that the format has no use for, and numbers out of range.
-    fn check(&self, format: Format) -> Result<(), Failure> {
+    /// Its own options and those of an FMU.
+    fn given(&self) -> [Given; 8] {
         use Format::{Cfs, Fmu, Fprime, Inp, Playback, Vtu};
         let loads: &[_] = &[Vtu, Inp, Playback, Cfs, Fprime];
-        let options = [
+        [
             ("--tables", self.tables.is_some(), &[Playback, Fmu, Cfs, Fprime][..]),
             ("--generator-rad", self.generator_rad.is_some(), &[Vtu]),
             ("--torque-n-m", self.model.torque_n_m.is_some(), loads),
@@ -184,8 +187,12 @@ impl Export {
             ("--step-rad", self.step_rad.is_some(), &[Inp]),
             ("--last-torque-n-m", self.last_torque_n_m.is_some(), &[Inp]),
             (self.fmu.given().unwrap_or_default(), self.fmu.given().is_some(), &[Fmu]),
-        ];
-        let mut options = options.into_iter().chain(self.playback.given());
+        ]
+    }
+
+    /// Refuses options that the format has no use for, and numbers out of range.
+    fn check(&self, format: Format) -> Result<(), Failure> {
+        let mut options = self.given().into_iter().chain(self.playback.given());
         if let Some((option, _, used)) = options.find(|(_, given, used)| *given && !used.contains(&format)) {
             let used: Vec<String> = used.iter().map(|format| format.name()).collect();
             return Err(Failure::BadInput(format!(
@@ -252,14 +259,8 @@ impl Export {
 
     /// The flexspline of a drive with a sleeve of shells, alone and in three dimensions.
     fn sleeve_deck(&self, context: &Context, drive: &Drive) -> Result<PathBuf, Failure> {
-        let of_the_plane = [
-            ("--torque-n-m", self.model.torque_n_m.is_some()),
-            ("--temperature-c", self.model.temperature_c.is_some()),
-            ("--increments", self.increments.is_some()),
-            ("--step-rad", self.step_rad.is_some()),
-            ("--last-torque-n-m", self.last_torque_n_m.is_some()),
-        ];
-        if let Some((option, _)) = of_the_plane.into_iter().find(|(_, given)| *given) {
+        let of_the_plane = |(_, given, used): &Given| *given && used.contains(&Format::Inp);
+        if let Some((option, ..)) = self.given().into_iter().find(of_the_plane) {
             return Err(Failure::BadInput(format!(
                 "{option}: the deck of a sleeve is the flexspline alone, under w0; allowed with a plane drive (--set \
                  sleeve.kind=springs)"

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::context::{Context, image_file, table_of};
-use super::export::Format;
+use super::export::{Format, Given};
 use super::logs::LogOptions;
 use super::replay::measured;
 use super::{Failure, bad_input, within};
@@ -56,7 +56,7 @@ pub(super) struct PlaybackOptions {
 
 impl PlaybackOptions {
     /// Its options, whether each is given, and the formats that have a use for it.
-    pub(super) fn given(&self) -> [(&'static str, bool, &'static [Format]); 8] {
+    pub(super) fn given(&self) -> [Given; 8] {
         const ALL: &[Format] = &[Format::Playback, Format::Cfs, Format::Fprime];
         [
             ("--data", self.data.is_some(), ALL),

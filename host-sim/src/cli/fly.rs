@@ -120,9 +120,8 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         "ripple ″/s",
         "settles s"
     );
-    let line = |of: &ByController<f64>| [of.none, of.fourier, of.fourier_by_direction, of.compensated, of.ideal];
-    let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(line);
-    let settles = results.settle_s.as_ref().map(line);
+    let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(ByController::all);
+    let settles = results.settle_s.as_ref().map(ByController::all);
     for (k, name) in flexspline_motion::flight::CONTROLLERS.iter().enumerate() {
         let [rms, max, ripple] = columns.map(|column| column[k]);
         let ripple = if ripple.is_finite() { format!("{ripple:.1}") } else { "–".to_owned() };

@@ -219,8 +219,25 @@ fn parse(args: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<
     Cli::from_arg_matches_mut(&mut matches)
 }
 
-#[derive(Debug, Subcommand)]
-enum CliCommand {
+/// The commands with their options, each run by the function `run` of these.
+macro_rules! commands {
+    ($($(#[$only:meta])? $name:ident($options:ty),)+) => {
+        #[derive(Debug, Subcommand)]
+        enum CliCommand {
+            $($(#[$only])? $name($options),)+
+        }
+
+        impl CliCommand {
+            fn run(&self, context: &Context) -> Result<(), Failure> {
+                match self {
+                    $($(#[$only])? CliCommand::$name(command) => command.run(context),)+
+                }
+            }
+        }
+    };
+}
+
+commands! {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
     Sweep(Box<sweep::SweepCommand>),
@@ -328,29 +345,6 @@ impl CliCommand {
             CliCommand::Replay(_) => &["replay.csv", "summary.json"],
             CliCommand::Synthesize(_) => &["data.csv", "truth.json"],
             _ => &[],
-        }
-    }
-
-    fn run(&self, context: &Context) -> Result<(), Failure> {
-        match self {
-            CliCommand::Simulate(command) => command.run(context),
-            CliCommand::Sleeve(command) => command.run(context),
-            CliCommand::Sweep(command) => command.run(context),
-            CliCommand::Drive(command) => command.run(context),
-            CliCommand::Fly(command) => command.run(context),
-            CliCommand::Export(command) => command.run(context),
-            CliCommand::Tables(command) => command.run(context),
-            CliCommand::Validate(command) => command.run(context),
-            CliCommand::Bundle(command) => command.run(context),
-            CliCommand::Calibrate(command) => command.run(context),
-            CliCommand::Replay(command) => command.run(context),
-            CliCommand::Synthesize(command) => command.run(context),
-            CliCommand::Look(command) => command.run(context),
-            CliCommand::Diagnose(command) => command.run(context),
-            CliCommand::Reproduce(command) => command.run(context),
-            CliCommand::New(command) => command.run(context),
-            #[cfg(feature = "serve")]
-            CliCommand::Serve(command) => command.run(context),
         }
     }
 }

@@ -151,15 +151,16 @@ impl Kernels {
     }
 
     /// `value` at a load of either sign: by mirror symmetry (`mirrored` for a negative one), between the loads.
-    fn under<V: Blend>(
+    fn under<const N: usize>(
         &self,
         torque_n_m: f64,
-        value: impl Fn(&LoadKernels) -> V,
-        mirrored: impl Fn(&LoadKernels) -> V,
-    ) -> V {
+        value: impl Fn(&LoadKernels) -> [f64; N],
+        mirrored: impl Fn(&LoadKernels) -> [f64; N],
+    ) -> [f64; N] {
         let (low, high, part) = Self::between(self.loads.iter().map(|l| l.torque_n_m), torque_n_m.abs());
         let of = |k: usize| if torque_n_m < 0.0 { mirrored(&self.loads[k]) } else { value(&self.loads[k]) };
-        of(low).blend(of(high), part)
+        let (low, high) = (of(low), of(high));
+        std::array::from_fn(|k| (1.0 - part) * low[k] + part * high[k])
     }
 
     /// Response to a harmonic of a kernel, arcsec per µm: to `cos(k α)` on the wheel answers
@@ -189,9 +190,10 @@ impl Kernels {
     /// pitch.
     #[must_use]
     pub(crate) fn displaced(&self, wheel: Wheel, place_rad: f64, torque_n_m: f64) -> f64 {
-        let at = |l: &LoadKernels, place: f64| self.at(&l.wheel(wheel).along, wheel, place);
+        let at = |l: &LoadKernels, place: f64| [self.at(&l.wheel(wheel).along, wheel, place)];
         // Mirrored, place, displacement and error all change their sign.
-        self.under(torque_n_m, |l| at(l, place_rad), |l| at(l, -place_rad))
+        let [error] = self.under(torque_n_m, |l| at(l, place_rad), |l| at(l, -place_rad));
+        error
     }
 
     /// Response to an oval circular spline, `cos(2 α)` µm outward, with the displacement along the ring and the
@@ -222,18 +224,18 @@ impl Kernels {
             DamagedFlank::Minus => (0.0, 1.0),
             DamagedFlank::Both => (1.0, 1.0),
         };
-        self.under(
-            torque_n_m,
-            |l| p * plus(l, place_rad) + m * minus(l, place_rad),
-            |l| -(p * minus(l, -place_rad) + m * plus(l, -place_rad)),
-        )
+        let value = |l: &LoadKernels| [p * plus(l, place_rad) + m * minus(l, place_rad)];
+        let mirrored = |l: &LoadKernels| [-(p * minus(l, -place_rad) + m * plus(l, -place_rad))];
+        let [error] = self.under(torque_n_m, value, mirrored);
+        error
     }
 
     /// Error (arcsec) for each µm that the generator stands further out over one pitch of the bore at `place_rad`.
     #[must_use]
     pub fn generator(&self, place_rad: f64, torque_n_m: f64) -> f64 {
         let at = |l: &LoadKernels, place: f64| self.at(&l.generator, Wheel::Flexspline, place);
-        self.under(torque_n_m, |l| at(l, place_rad), |l| -at(l, -place_rad))
+        let [error] = self.under(torque_n_m, |l| [at(l, place_rad)], |l| [-at(l, -place_rad)]);
+        error
     }
 
     /// Where a load lies between those of the eccentricity: for [`EccentricField::at`].
@@ -373,23 +375,6 @@ impl LoadKernels {
             Wheel::Flexspline => &self.flexspline,
             Wheel::CircularSpline => &self.circular_spline,
         }
-    }
-}
-
-/// Values that can be mixed linearly.
-trait Blend {
-    fn blend(self, other: Self, part: f64) -> Self;
-}
-
-impl Blend for f64 {
-    fn blend(self, other: f64, part: f64) -> f64 {
-        (1.0 - part) * self + part * other
-    }
-}
-
-impl Blend for Gain {
-    fn blend(self, other: Gain, part: f64) -> Gain {
-        [self[0].blend(other[0], part), self[1].blend(other[1], part)]
     }
 }
 

@@ -56,3 +56,10 @@ pub struct Row {
     #[serde(skip)]
     pub turn_rad: f64,
 }
+
+impl Row {
+    /// Whether load and temperature are those of another row.
+    pub(super) fn has_load_of(&self, other: &Row) -> bool {
+        self.torque_n_m == other.torque_n_m && self.temperature_c == other.temperature_c
+    }
+}

@@ -328,31 +328,22 @@ impl<'a> SteadyStretch<'a> {
 
 /// Settled one-way stretches, in order.
 fn stretches(rows: &[Row], pitch: f64) -> Vec<SteadyStretch<'_>> {
-    let mut found = Vec::new();
+    let goes_on =
+        |a: &Row, b: &Row| a.settled && b.settled && a.turn_rad.signum() == b.turn_rad.signum() && a.has_load_of(b);
     let mut begin = 0;
-    let same = |a: &Row, b: &Row| {
-        a.turn_rad.signum() == b.turn_rad.signum() && a.torque_n_m == b.torque_n_m && a.temperature_c == b.temperature_c
+    let stretch = |part: &[Row]| {
+        let range = begin..begin + part.len();
+        begin = range.end;
+        part[0].settled.then(|| SteadyStretch::new(rows, range, pitch))
     };
-    while begin < rows.len() {
-        let mut end = begin + 1;
-        if rows[begin].settled {
-            while end < rows.len() && rows[end].settled && same(&rows[begin], &rows[end]) {
-                end += 1;
-            }
-            found.push(SteadyStretch::new(rows, begin..end, pitch));
-        }
-        begin = end;
-    }
-    found
+    rows.chunk_by(goes_on).filter_map(stretch).collect()
 }
 
 /// The row at which the generator first reverses under a constant load and temperature.
 fn first_reversal(rows: &[Row]) -> Option<usize> {
     (1..rows.len()).map(|next| next - 1).find(|&at| {
         let (here, next) = (&rows[at], &rows[at + 1]);
-        here.turn_rad * next.turn_rad < 0.0
-            && here.torque_n_m == next.torque_n_m
-            && here.temperature_c == next.temperature_c
+        here.turn_rad * next.turn_rad < 0.0 && here.has_load_of(next)
     })
 }
 
@@ -384,11 +375,8 @@ impl Metrics {
             let before = stretches.iter().rfind(|stretch| stretch.range.contains(&at))?;
             let after = stretches.iter().find(|stretch| stretch.range.start > at)?;
             // The stretch after it must not lie beyond another reversal or another load.
-            let undisturbed = rows[at + 1..after.range.end].iter().all(|row| {
-                row.turn_rad * before.rows[0].turn_rad < 0.0
-                    && row.torque_n_m == rows[at].torque_n_m
-                    && row.temperature_c == rows[at].temperature_c
-            });
+            let back = |row: &Row| row.turn_rad * before.rows[0].turn_rad < 0.0 && row.has_load_of(&rows[at]);
+            let undisturbed = rows[at + 1..after.range.end].iter().all(back);
             let (before_mean, after_mean) = (error(before)?, error(after)?);
             let (forward, backward) =
                 if before.forward() { (before_mean, after_mean) } else { (after_mean, before_mean) };

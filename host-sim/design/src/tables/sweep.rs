@@ -163,6 +163,21 @@ pub(crate) struct KnownNode {
     pub points: Vec<Computed>,
 }
 
+/// Counts the increment that a motion ends with, and reports it.
+pub(super) fn report(
+    observe: &Observer<'_>,
+    motion: &Motion<'_>,
+    temperature_c: f64,
+    work: &mut Work,
+) -> Result<(), TorqueSweepError> {
+    let (iterations, torque_n_m) = (motion.last().iterations, motion.state().torque_n_m);
+    work.count(motion.last());
+    match observe(SweepProgress { iterations, torque_n_m, temperature_c }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(TorqueSweepError::Stopped),
+    }
+}
+
 impl<'a> Sampler<'a> {
     /// A sampler at a temperature.
     pub fn new(
@@ -180,12 +195,7 @@ impl<'a> Sampler<'a> {
     }
 
     fn report(&self, motion: &Motion<'_>, work: &mut Work) -> Result<(), TorqueSweepError> {
-        let (iterations, torque_n_m) = (motion.last().iterations, motion.state().torque_n_m);
-        work.count(motion.last());
-        match (self.observe)(SweepProgress { iterations, torque_n_m, temperature_c: self.temperature_c }) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(TorqueSweepError::Stopped),
-        }
+        report(self.observe, motion, self.temperature_c, work)
     }
 
     fn goes_on(&self, from: &Loaded) -> Motion<'_> {

@@ -23,16 +23,13 @@
 //! misses is seen by `validate`.
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 
 use flexspline_algebra::{Mat, cholesky, product};
 use flexspline_make::Sample;
 use rayon::prelude::*;
 
 use super::project::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
-use super::sweep::{
-    KnownNode, Observer, Sampler, SweepPlan, SweepProgress, TorqueSweep, TorqueSweepError, Work, sweep,
-};
+use super::sweep::{KnownNode, Observer, Sampler, SweepPlan, TorqueSweep, TorqueSweepError, Work, report, sweep};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
@@ -132,16 +129,7 @@ struct Count<'a> {
 
 impl Count<'_> {
     fn report(&mut self, motion: &Motion<'_>) -> Result<(), TorqueSweepError> {
-        self.work.count(motion.last());
-        let progress = SweepProgress {
-            iterations: motion.last().iterations,
-            torque_n_m: motion.state().torque_n_m,
-            temperature_c: motion.problem().drive.temperature.reference_c,
-        };
-        match (self.observe)(progress) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(TorqueSweepError::Stopped),
-        }
+        report(self.observe, motion, motion.problem().drive.temperature.reference_c, &mut self.work)
     }
 
     /// The transmission error at places in ascending order, under one load.

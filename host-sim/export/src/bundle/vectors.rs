@@ -52,29 +52,35 @@ fn steps(table: &Table<'_>, count: usize) -> Vec<TestStep> {
     steps
 }
 
+impl TestStep {
+    /// The fields of a `flexspline_vector`; `counts` writes an angle.
+    fn fields(&self, counts: impl Fn(i64) -> String) -> String {
+        let TestStep { measured, target, torque, temperature, now, next } = self;
+        let bits = |number: f32| format!("0x{:08x}", number.to_bits());
+        [
+            counts(measured.counts()),
+            counts(target.counts()),
+            bits(*torque),
+            bits(*temperature),
+            counts(now.output.counts()),
+            bits(now.transmission_error_rad),
+            bits(now.uncertainty_rad),
+            (now.quality as u32).to_string(),
+            counts(next.generator.counts()),
+            bits(next.predicted_error_rad),
+            bits(next.uncertainty_rad),
+            (next.quality as u32).to_string(),
+        ]
+        .join(",")
+    }
+}
+
 /// The steps of a table for people and other programs.
 pub(super) fn csv(table: &Table<'_>, count: usize) -> String {
     let mut text = format!("{COLUMNS}\n");
     for step in steps(table, count) {
-        let TestStep { measured, target, torque, temperature, now, next } = step;
-        let bits = |number: f32| format!("0x{:08x}", number.to_bits());
-        let _ = writeln!(
-            text,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{torque},{temperature},{:e}",
-            measured.counts(),
-            target.counts(),
-            bits(torque),
-            bits(temperature),
-            now.output.counts(),
-            bits(now.transmission_error_rad),
-            bits(now.uncertainty_rad),
-            now.quality as u32,
-            next.generator.counts(),
-            bits(next.predicted_error_rad),
-            bits(next.uncertainty_rad),
-            next.quality as u32,
-            now.transmission_error_rad,
-        );
+        let (fields, TestStep { torque, temperature, now, .. }) = (step.fields(|counts| counts.to_string()), &step);
+        let _ = writeln!(text, "{fields},{torque},{temperature},{:e}", now.transmission_error_rad);
     }
     text
 }
@@ -84,24 +90,8 @@ pub(super) fn array(name: &str, table: &Table<'_>, count: usize) -> String {
     let mut text = format!("/* Steps of {name}.fxt, table {}: see vectors.h. */\n", table.id());
     let _ = writeln!(text, "static const flexspline_vector flexspline_{name}_vectors[{count}] = {{");
     for step in steps(table, count) {
-        let TestStep { measured, target, torque, temperature, now, next } = step;
-        let _ = writeln!(
-            text,
-            "    {{INT64_C({}), INT64_C({}), 0x{:08x}, 0x{:08x}, INT64_C({}), 0x{:08x}, 0x{:08x}, {}, INT64_C({}), \
-             0x{:08x}, 0x{:08x}, {}}},",
-            measured.counts(),
-            target.counts(),
-            torque.to_bits(),
-            temperature.to_bits(),
-            now.output.counts(),
-            now.transmission_error_rad.to_bits(),
-            now.uncertainty_rad.to_bits(),
-            now.quality as u32,
-            next.generator.counts(),
-            next.predicted_error_rad.to_bits(),
-            next.uncertainty_rad.to_bits(),
-            next.quality as u32,
-        );
+        let fields = step.fields(|counts| format!("INT64_C({counts})"));
+        let _ = writeln!(text, "    {{{}}},", fields.replace(',', ", "));
     }
     text + "};\n"
 }

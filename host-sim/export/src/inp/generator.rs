@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 use super::Point;
 use flexspline_mechanics::drive::GeneratorOutline;
-use flexspline_mechanics::mesh::WheelMesh;
+use flexspline_mechanics::mesh::{WheelMesh, rotate};
 
 /// Depth of a strip behind its face, mm.
 const DEPTH: f64 = 1.0;
@@ -106,13 +106,14 @@ impl GeneratorBody {
 
     /// Where they stand with the generator at an angle (rad), mm.
     pub fn at(&self, generator_rad: f64) -> Vec<Point> {
+        let turned = generator_rad.sin_cos();
         match &self.shape {
             SurfaceShape::Ring(angles) => nodes_behind(angles.iter().map(|angle| {
                 let (point, normal) = self.opposite(angle - generator_rad);
-                (rotate(point, generator_rad), rotate(normal, generator_rad))
+                (rotate(point, turned), rotate(normal, turned))
             })),
             SurfaceShape::Rollers { centres, radius, .. } => {
-                let centres: Vec<Point> = centres.iter().map(|c| rotate(*c, generator_rad)).collect();
+                let centres: Vec<Point> = centres.iter().map(|c| rotate(*c, turned)).collect();
                 // The bore passes the generator by its own radius times the angle.
                 self.rollers(&centres, generator_rad * (1.0 - self.bore_radius / radius))
             }
@@ -165,11 +166,6 @@ fn unit_at(angle: f64) -> Point {
     [angle.cos(), angle.sin()]
 }
 
-fn rotate(p: Point, angle: f64) -> Point {
-    let (s, c) = angle.sin_cos();
-    [c * p[0] - s * p[1], s * p[0] + c * p[1]]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,7 +186,7 @@ mod tests {
             for psi in [0.0, 0.3] {
                 let nodes = body.at(psi);
                 for element in &body.elements {
-                    let [a, m, b] = [element[1], element[5], element[2]].map(|n| rotate(nodes[n as usize], -psi));
+                    let [a, m, b] = [element[1], element[5], element[2]].map(|n| rotate(nodes[n as usize], f64::sin_cos(-psi)));
                     // Where the discs cross there is a corner that no bore touches.
                     if kind == GeneratorKind::DoubleDisc && a[0].abs().min(b[0].abs()) < 1.0 {
                         continue;

@@ -84,7 +84,7 @@ pub(super) fn bore_sums(
                     terms.extend(helper.map(|node| EquationTerm { node, dof: 1, coefficient: sign * share }));
                 }
             }
-            equations.push(Equation { terms });
+            equations.push(terms);
         }
     }
     BoreSums { equations, edges: mesh.teeth * mesh.base_edges.len() }
@@ -125,7 +125,7 @@ mod tests {
             let mut matrix = [[0.0; SUMS]; SUMS];
             let mut right = [0.0; SUMS];
             for (k, equation) in equations.iter().enumerate() {
-                for term in &equation.terms {
+                for term in equation {
                     if term.node < HELPERS {
                         right[k] -= term.coefficient * u[2 * term.node + usize::from(term.dof) - 1];
                         continue;
@@ -190,12 +190,12 @@ mod tests {
         let mesh = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Standard).unwrap();
         let sums = bore_sums(&mesh, |n| n, |sector, which| Some(HELPERS + SUMS * sector + which));
         let name = |term: &EquationTerm| (term.node, term.dof);
-        let dependent: std::collections::BTreeSet<_> = sums.equations.iter().map(|e| name(&e.terms[0])).collect();
+        let dependent: std::collections::BTreeSet<_> = sums.equations.iter().map(|e| name(&e[0])).collect();
         assert_eq!(dependent.len(), SUMS * mesh.teeth);
         for equation in &sums.equations {
-            assert!(equation.terms.len() < 40, "a long equation fills the matrix");
-            assert!((equation.terms[0].coefficient - 1.0).abs() < 1e-12);
-            assert!(equation.terms[1..].iter().all(|term| !dependent.contains(&name(term))));
+            assert!(equation.len() < 40, "a long equation fills the matrix");
+            assert!((equation[0].coefficient - 1.0).abs() < 1e-12);
+            assert!(equation[1..].iter().all(|term| !dependent.contains(&name(term))));
         }
     }
 }

@@ -9,22 +9,6 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// Names of scenarios.
 pub const SCENARIOS: [&str; 4] = ["antenna", "rover", "camera", "telescope"];
 
-/// A servo of the size of HHD-95's motor, at 1 kHz, 0.2 ms late: 17 bits, tuned for the motor alone at a speed loop
-/// that the load's resonance leaves a margin.
-const SERVO: ServoSettings = ServoSettings {
-    tick_s: 1e-3,
-    steps: 5,
-    late_steps: 1,
-    inertia_kg_m2: 1.1e-4,
-    largest_n_m: 4.0,
-    position_hz: 6.0,
-    speed_hz: 50.0,
-    integral_hz: 3.0,
-    encoder_bits: 17,
-    jitter_s: 5e-6,
-    current_noise_n_m: 1e-3,
-};
-
 fn legs(legs: &[(f64, f64)]) -> Vec<Leg> {
     legs.iter().map(|&(seconds, rate_rad_s)| Leg { seconds, rate_rad_s }).collect()
 }
@@ -43,7 +27,7 @@ pub fn built_in(name: &str) -> Option<Flown> {
         damping: 0.02,
         temperature_c: 20.0,
         warming_k_s: 0.0,
-        servo: SERVO,
+        servo: ServoSettings::HHD_95,
         friction: 1.0,
         friction_known: 0.8,
         load_fed_forward: 1.0,
@@ -104,7 +88,13 @@ pub fn built_in(name: &str) -> Option<Flown> {
             Scenario {
                 acceleration_rad_s2: 1e-3,
                 load_kg_m2: 6.0,
-                servo: ServoSettings { position_hz: 3.0, speed_hz: 25.0, integral_hz: 1.5, encoder_bits: 20, ..SERVO },
+                servo: ServoSettings {
+                    position_hz: 3.0,
+                    speed_hz: 25.0,
+                    integral_hz: 1.5,
+                    encoder_bits: 20,
+                    ..ServoSettings::HHD_95
+                },
                 ..base(
                     legs(&[(2.0, 0.0), (60.0, 7.292_115e-5)]),
                     Load { gravity: [25.0, 0.8], gust: [2.0, 0.1], ..none },

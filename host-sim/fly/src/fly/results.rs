@@ -1,6 +1,6 @@
 //! A flight in numbers.
 
-use flexspline_motion::flight::{COMPENSATED, Flight, Flown, START_UP_S};
+use flexspline_motion::flight::{COMPENSATED, CONTROLLERS, Flight, Flown, START_UP_S};
 use flexspline_motion::loops::TwoMasses;
 use flexspline_motion::scenario::{Scenario, TableKnown, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
@@ -36,6 +36,15 @@ pub struct ByController<T> {
     pub compensated: T,
     /// The unit's own law and the true torque at rest: what a quasi-static inverse can do.
     pub ideal: T,
+}
+
+impl<T: Copy> ByController<T> {
+    /// In the order of the controllers.
+    #[must_use]
+    pub fn all(&self) -> [T; CONTROLLERS.len()] {
+        let ByController { none, fourier, fourier_by_direction, compensated, ideal } = *self;
+        [none, fourier, fourier_by_direction, compensated, ideal]
+    }
 }
 
 /// Results of `flexspline fly`.
@@ -174,16 +183,10 @@ pub type Row = [f64; 2];
 /// Where an ideal leaves more than this of the error, no share of what it removes is given. *Guess*.
 const IDEAL_REMOVES: f64 = 0.98;
 
-fn by_controller<T>(flight: &Flight, value: impl Fn(&Flown) -> T) -> Option<ByController<T>> {
-    let mut values = flight.flown.iter().map(value);
-    let mut next = || values.next();
-    Some(ByController {
-        none: next()?,
-        fourier: next()?,
-        fourier_by_direction: next()?,
-        compensated: next()?,
-        ideal: next()?,
-    })
+fn by_controller<T: Copy>(flight: &Flight, value: impl Fn(&Flown) -> T) -> Option<ByController<T>> {
+    let values: Vec<T> = flight.flown.iter().map(value).collect();
+    let &[none, fourier, fourier_by_direction, compensated, ideal] = values.as_slice() else { return None };
+    Some(ByController { none, fourier, fourier_by_direction, compensated, ideal })
 }
 
 /// The numbers of a flight; `None` if a controller is missing.

@@ -18,4 +18,4 @@ pub use chain::{Chain, ChainBlock, Contribution};
 pub use corotation::{CellState, CoRotation};
 pub use dense::{DenseKernels, one, one_mut};
 pub use model::{Cell, CondensedWheel};
-pub use tangent::{CellAt, CellPlacement, CellTangent, Geometric, Traction, back, rotate_pairs, rotate_sides};
+pub use tangent::{CellAt, CellPlacement, CellTangent, Geometric, Traction, Turn, back, rotate_pairs, rotate_sides};

@@ -50,16 +50,12 @@ impl Traction {
 }
 
 /// (sine, cosine) of an angle.
-type Turn = (f64, f64);
+pub type Turn = (f64, f64);
 
 /// A reduced tangent.
 #[derive(Debug, Clone, Default)]
 pub struct CellTangent {
-    /// Frame of the cell against the global one, and against the frames of its two faces.
-    frame: Turn,
-    faces: [Turn; 2],
-    /// Blocks of its faces in the chain.
-    blocks: [u32; 2],
+    place: CellPlacement,
     tractions: Vec<Traction>,
     /// a on the faces and g on the flanks; empty in a cell that does not turn.
     turn_rate: Vec<f64>,
@@ -71,12 +67,12 @@ pub struct CellTangent {
 }
 
 /// Where a cell stands.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct CellPlacement {
-    /// Angle of its frame against the global one, rad.
-    pub frame: f64,
-    /// Of its frame against those of its two faces, rad.
-    pub faces: [f64; 2],
+    /// Turn of its frame against the global one.
+    pub frame: Turn,
+    /// Of its frame against those of its two faces.
+    pub faces: [Turn; 2],
     /// Blocks of its faces in the chain.
     pub blocks: [u32; 2],
 }
@@ -133,9 +129,7 @@ impl CellTangent {
     ) -> Option<Contribution> {
         let (f, b, i) = (cell.flank(), cell.bore(), 2 * cell.face());
         let r = b + i;
-        self.frame = place.frame.sin_cos();
-        self.faces = place.faces.map(f64::sin_cos);
-        self.blocks = place.blocks;
+        self.place = place;
         self.tractions = tractions;
 
         // Bore and faces.
@@ -215,8 +209,8 @@ impl CellTangent {
             self.turn_rate.extend_from_slice(a);
             self.flank_geometric.extend_from_slice(geometric_flank);
         }
-        rotate_faces(&mut matrix, n, i / 2, &self.faces);
-        let mut blocks = self.blocks.to_vec();
+        rotate_faces(&mut matrix, n, i / 2, &self.place.faces);
+        let mut blocks = self.place.blocks.to_vec();
         blocks.extend(self.tractions.iter().map(|t| t.block));
         Some(Contribution { blocks, matrix })
     }
@@ -232,7 +226,7 @@ impl CellTangent {
         let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
         let [force, body, yielded] = at.parts(kept);
         force.iter_mut().zip(unknowns).for_each(|(force, u)| *force = x[*u as usize]);
-        rotate_sides(force, back(self.frame));
+        rotate_sides(force, back(self.place.frame));
         let (flank, bore) = force.split_at_mut(f);
         body[..b].copy_from_slice(bore);
         kernels.multiply_transposed_add(&cell.flank_coupling, flank, -1.0, body);
@@ -254,8 +248,8 @@ impl CellTangent {
             faces.iter_mut().zip(&self.turn_rate).for_each(|(x, a)| add(x, *a, folded));
         }
         for (side, part) in faces.chunks_exact_mut(face).enumerate() {
-            rotate_sides(part, self.faces[side]);
-            let to = order.offset(self.blocks[side] as usize);
+            rotate_sides(part, self.place.faces[side]);
+            let to = order.offset(self.place.blocks[side] as usize);
             chain[to..to + face].iter_mut().zip(part.iter()).for_each(|(c, x)| add(c, 1.0, x));
         }
         let mut rest = rest.as_slice();
@@ -273,9 +267,9 @@ impl CellTangent {
         let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
         let [force, body, yielded] = at.parts(kept);
         for (side, part) in body[b..].chunks_exact_mut(face).enumerate() {
-            let from = order.offset(self.blocks[side] as usize);
+            let from = order.offset(self.place.blocks[side] as usize);
             part.copy_from_slice(&chain[from..from + face]);
-            rotate_sides(part, back(self.faces[side]));
+            rotate_sides(part, back(self.place.faces[side]));
         }
         let mut rest = Vec::with_capacity(self.extra.len() / b.max(1));
         for traction in &self.tractions {
@@ -303,7 +297,7 @@ impl CellTangent {
         }
         kernels.multiply_add(&cell.flank_flexibility, yielded, -1.0, flank);
         kernels.multiply_add(&cell.flank_coupling, body, -1.0, flank);
-        rotate_sides(force, self.frame);
+        rotate_sides(force, self.place.frame);
         for (u, value) in unknowns.iter().zip(force.iter()) {
             x[*u as usize] = *value;
         }

@@ -18,10 +18,10 @@
 //! derived here:* the foundation has no more length in it than the gap, so that drives that are one another's image at
 //! another scale have the same pressures.
 
+use crate::drive::halved;
+
 /// For which a parabola has the pressure of Hertz.
 const FOUNDATION: f64 = 8.0 / (3.0 * std::f64::consts::PI);
-/// Halvings of the interval of a level: to round-off.
-const HALVINGS: usize = 60;
 /// Doublings of the first guess of a level, which is that of a flat gap, a factor of four from that of a wedge.
 const MOST_DOUBLINGS: usize = 64;
 
@@ -85,17 +85,14 @@ fn peak_of_one(places: &[FacePoint], force: f64, modulus_mpa: f64) -> f64 {
         if half > 0.0 { FOUNDATION * modulus_mpa * area / half } else { 0.0 }
     };
     // A flat gap bears with 2 c E* L, a parabola with two thirds of that, a wedge with half.
-    let (mut low, mut high) = (0.0, 2.0 * force / (FOUNDATION * modulus_mpa));
+    let mut high = 2.0 * force / (FOUNDATION * modulus_mpa);
     for _ in 0..MOST_DOUBLINGS {
         if !(borne(high) < force && high.is_finite() && high > 0.0) {
             break;
         }
         high *= 2.0;
     }
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if borne(middle) < force { low = middle } else { high = middle }
-    }
+    let [_, high] = halved(0.0, high, |depth| borne(depth) < force);
     let (area, _) = below(high);
     if area > 0.0 { force * high / area } else { 0.0 }
 }

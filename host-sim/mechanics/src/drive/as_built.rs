@@ -24,70 +24,87 @@
 //! An imperfect drive does not repeat from tooth to tooth any more. What still does, with period `2 pi / z_f` in the
 //! generator angle: any generator (a constant shape), uniform wear, a difference in temperature.
 
+use super::fields::{DEPTH, PHASE, section};
 use super::sleeve::{Choice, choice};
 use super::spec::Drive;
-use crate::toml_file::Problem;
+use crate::toml_file::{Problem, from};
 use serde::{Serialize, Serializer};
 use std::f64::consts::PI;
 
-/// Imperfections of a drive as built; all zero or empty is the ideal drive. Field names are the keys of `[as_built]`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct AsBuilt {
+section! {
+    /// Imperfections of a drive as built; all zero or empty is the ideal drive. Field names are the keys of
+    /// `[as_built]`.
+    #[derive(Default)]
+    AsBuilt = as_built,
+        "errors of the drive as it was made; 0 or [] is as drawn. A harmonic is amplitude cos(order (angle - phase))";
     /// How far the toothing of the circular spline is offset from the axis it turns about, µm.
-    pub circular_spline_eccentricity_um: f64,
+    circular_spline_eccentricity_um: Real, from(0.0, 100.0), "toothing beside the axis it turns about, µm";
     /// Whereto, degrees on the circular spline.
-    pub circular_spline_eccentricity_phase_deg: f64,
+    circular_spline_eccentricity_phase_deg: Real, PHASE,
+        "whereto, degrees on the circular spline, positive counter-clockwise from space 0";
     /// The toothing of the circular spline is pressed to an oval: amplitude of its radius, µm. The ring keeps its
     /// length: a point moves by `a cos 2(angle - phase)` outward and `-a/2 sin 2(angle - phase)` along the ring, and
     /// the teeth turn by `3a/(2r) sin 2(angle - phase)`.
-    pub circular_spline_ovality_um: f64,
+    circular_spline_ovality_um: Real, from(0.0, 100.0), "amplitude of the oval, length kept, µm";
     /// Angle of a crest of the oval, degrees on the circular spline.
-    pub circular_spline_ovality_phase_deg: f64,
+    circular_spline_ovality_phase_deg: Real, PHASE,
+        "angle of a crest, degrees on the circular spline, positive counter-clockwise from space 0";
     /// Cumulative pitch error of the circular spline by harmonic: position error of its spaces along the pitch.
-    pub circular_spline_pitch_harmonics: Vec<Harmonic>,
+    circular_spline_pitch_harmonics: Harmonics, from(0.0, 100.0),
+        "cumulative pitch error, positive counter-clockwise, [{ order, amplitude_um, phase_deg of a crest }, ...]";
     /// Position error of each space of the circular spline, µm, space 0 first; none, or one for each. Adds to the
     /// harmonics.
-    pub circular_spline_pitch_error_um: Vec<f64>,
+    circular_spline_pitch_error_um: List, from(-100.0, 100.0),
+        "position error of each space, or none, µm; positive counter-clockwise";
     /// How far the axis that the circular spline turns about is offset from the axis of the housing, about which the
     /// generator turns, µm: misalignment, or what a side load makes of the output bearing.
-    pub circular_spline_offset_um: f64,
+    circular_spline_offset_um: Real, from(0.0, 100.0), "its axis beside that of the housing, µm";
     /// Whereto, degrees in the housing.
-    pub circular_spline_offset_direction_deg: f64,
+    circular_spline_offset_direction_deg: Real, PHASE,
+        "whereto, degrees in the housing, positive counter-clockwise from the major axis at generator angle 0";
     /// How far the toothing of the flexspline is offset from the axis of its bore, µm. This is its kinematic part; the
     /// wall that is then thicker on one side is order 1 of [`AsBuilt::rim_thickness_harmonics`], which has the same
     /// kinematic part and takes the place of this one.
-    pub flexspline_runout_um: f64,
+    flexspline_runout_um: Real, from(0.0, 100.0), "toothing beside the axis of the bore, µm";
     /// Whereto, degrees on the flexspline.
-    pub flexspline_runout_phase_deg: f64,
+    flexspline_runout_phase_deg: Real, PHASE,
+        "whereto, degrees on the flexspline, positive counter-clockwise from tooth 0";
     /// Cumulative pitch error of the flexspline by harmonic: position error of its teeth along the pitch.
-    pub flexspline_pitch_harmonics: Vec<Harmonic>,
+    flexspline_pitch_harmonics: Harmonics, from(0.0, 100.0),
+        "cumulative pitch error, positive counter-clockwise, [{ order, amplitude_um, phase_deg of a crest }, ...]";
     /// Position error of each tooth of the flexspline, µm, tooth 0 first; none, or one for each. Adds to the harmonics.
-    pub flexspline_pitch_error_um: Vec<f64>,
+    flexspline_pitch_error_um: List, from(-100.0, 100.0),
+        "position error of each tooth, or none, µm; positive counter-clockwise";
     /// Thickness of the flexspline's rim by harmonic. The teeth are true, the bore is not: where the rim is thicker,
     /// the bore stands further in.
-    pub rim_thickness_harmonics: Vec<Harmonic>,
+    rim_thickness_harmonics: Harmonics, from(0.0, 1000.0),
+        "thickness of the rim, positive: thicker, [{ order, amplitude_um, phase_deg of a crest }, ...]";
     /// How far the generator is offset from the axis it turns about, µm.
-    pub generator_eccentricity_um: f64,
+    generator_eccentricity_um: Real, from(0.0, 100.0), "generator beside the axis it turns about, µm";
     /// Whereto, degrees on the generator.
-    pub generator_eccentricity_phase_deg: f64,
+    generator_eccentricity_phase_deg: Real, PHASE,
+        "whereto, degrees on the generator, positive counter-clockwise from the major axis";
     /// How much higher the lobe of the generator at 0° stands than the one at 180°, µm: half of it is added to the one
     /// and taken from the other. The rollers or disc of a lobe are moved along the normal on which they were placed
     /// (for two rollers or discs an eccentricity of half the asymmetry along the major axis); a cam takes the form
     /// `a/2 cos 3 angle`, as order 1 would be an eccentricity.
-    pub generator_lobe_asymmetry_um: f64,
+    generator_lobe_asymmetry_um: Real, from(-100.0, 100.0),
+        "lobe at 0 degrees less that at 180, µm; positive: the one at 0 is higher";
     /// Form error of the cam by harmonic, along its outward normal; other generators are circles and have none.
-    pub cam_form_harmonics: Vec<Harmonic>,
+    cam_form_harmonics: Harmonics, from(0.0, 100.0),
+        "form error of the cam, positive outward, [{ order, amplitude_um, phase_deg of a crest }, ...]";
     /// Depth worn off every flank of the flexspline, µm.
-    pub flexspline_wear_um: f64,
+    flexspline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
     /// Depth worn off every flank of the circular spline, µm.
-    pub circular_spline_wear_um: f64,
+    circular_spline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
     /// Teeth that lack more than that.
-    pub damaged_teeth: Vec<DamagedTooth>,
+    damaged_teeth: Damage, DEPTH, "[{ wheel, tooth, flank = \"plus\", \"minus\" or \"both\", depth_um }, ...]";
     /// How much warmer the generator is than the flexspline, K.
-    pub generator_warmer_k: f64,
+    generator_warmer_k: Real, from(-100.0, 100.0), "generator less flexspline, K; positive: the generator is warmer";
     /// How much warmer the circular spline, and what holds it, is than the flexspline, K. Its stiffness stays that of
     /// the drive's temperature: 30 K are 1 % of a part that gives a tenth of the compliance.
-    pub circular_spline_warmer_k: f64,
+    circular_spline_warmer_k: Real, from(-100.0, 100.0),
+        "circular spline and its seat less flexspline, K; positive: they are warmer";
 }
 
 /// One harmonic of an error around a part.

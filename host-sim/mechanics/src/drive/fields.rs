@@ -1,10 +1,10 @@
-//! Every number of a drive file, once: path, unit, meaning, range, and where it lives in [`Drive`]. Reading, writing,
-//! overriding, checking and hashing all walk this list.
+//! Every number of a drive file, once: path, unit, meaning, range, and where it lives in [`Drive`], section by section
+//! beside the struct that holds it. Reading, writing, overriding, checking and hashing all walk this list.
 
-use super::as_built::{DamagedTooth, Harmonic};
-use super::sleeve::{Choice, FaceLoad, Profile, SleeveKind};
-use super::spec::Drive;
-use crate::toml_file::{Allowed, above, from};
+use super::as_built::{AsBuilt, DamagedTooth, Harmonic};
+use super::sleeve::{Choice, FaceLoad, Profile, Sleeve, SleeveKind};
+use super::spec::{CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Temperature};
+use crate::toml_file::{Allowed, from};
 
 /// One number of the file.
 pub(super) struct Field {
@@ -13,7 +13,15 @@ pub(super) struct Field {
     /// Meaning, for the comment in a written file.
     pub meaning: &'static str,
     pub range: Allowed,
-    slot: fn(&mut Drive) -> Slot<'_>,
+    pub slot: fn(&mut Drive) -> Slot<'_>,
+}
+
+/// A section of the file.
+pub(super) struct Section {
+    pub name: &'static str,
+    /// For the comment in a written file.
+    pub contents: &'static str,
+    pub fields: &'static [Field],
 }
 
 /// Where a field lives.
@@ -83,147 +91,65 @@ pub(super) const DEPTH: Allowed = from(0.0, 500.0);
 pub(super) const TOOTH: Allowed = from(0.0, 2001.0);
 
 /// The range of a field that is no number.
-const NO_NUMBER: Allowed = from(0.0, 0.0);
+pub(super) const NO_NUMBER: Allowed = from(0.0, 0.0);
 
-macro_rules! fields {
-    ($($section:ident . $key:ident : $slot:ident, $range:expr, $meaning:literal;)*) => {
-        &[$(Field {
-            path: concat!(stringify!($section), ".", stringify!($key)),
-            meaning: $meaning,
-            range: $range,
-            slot: |drive| Slot::$slot(&mut drive.$section.$key),
-        }),*]
+/// What a slot of a kind holds.
+macro_rules! held {
+    (Real) => { f64 };
+    (RealOrRigid) => { Option<f64> };
+    (Count) => { u32 };
+    (Word $choice:ident) => { $choice };
+    (List) => { Vec<f64> };
+    (Harmonics) => { Vec<Harmonic> };
+    (Damage) => { Vec<DamagedTooth> };
+}
+pub(super) use held;
+
+/// A section of the file: the struct that holds it, and what the file says of each field.
+macro_rules! section {
+    (
+        $(#[$about:meta])* $type:ident = $section:ident, $contents:literal;
+        $($(#[$doc:meta])* $key:ident: $slot:ident $(($choice:ident))?, $range:expr, $meaning:literal;)*
+    ) => {
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        $(#[$about])*
+        pub struct $type {
+            $($(#[$doc])* pub $key: super::fields::held!($slot $($choice)?)),*
+        }
+
+        impl $type {
+            pub(super) const SECTION: super::fields::Section = super::fields::Section {
+                name: stringify!($section),
+                contents: $contents,
+                fields: &[$(super::fields::Field {
+                    path: concat!(stringify!($section), ".", stringify!($key)),
+                    meaning: $meaning,
+                    range: $range,
+                    slot: |drive| super::fields::Slot::$slot(&mut drive.$section.$key),
+                }),*],
+            };
+        }
     };
 }
+pub(super) use section;
 
-/// Contents of each section of the file, for the comment in a written file.
-pub(super) const SECTIONS: &[(&str, &str)] = &[
-    ("flexspline", "the thin wheel with external teeth, undeformed; held by its sleeve"),
-    ("circular_spline", "the ring with internal teeth; the output"),
-    ("material", "of both wheels"),
-    ("generator", "of all four wave generators; each takes what it has"),
-    ("output", "what brakes the output beside its load"),
-    (
-        "sleeve",
-        "what holds the rim of the flexspline: shells (hermetic: rim between two tubes; cup; hat: tube and flange), \
-         springs or nothing",
-    ),
-    ("flanks", "where the teeth touch"),
-    ("temperature", "what warmth changes"),
-    (
-        "as_built",
-        "errors of the drive as it was made; 0 or [] is as drawn. A harmonic is amplitude cos(order (angle - phase))",
-    ),
+/// All sections, in the order of a written file.
+pub(super) static SECTIONS: [Section; 9] = [
+    Flexspline::SECTION,
+    CircularSpline::SECTION,
+    Material::SECTION,
+    Generators::SECTION,
+    OutputLoadPath::SECTION,
+    Sleeve::SECTION,
+    Flanks::SECTION,
+    Temperature::SECTION,
+    AsBuilt::SECTION,
 ];
 
 /// All fields, in the order of a written file.
-pub(super) const ALL: &[Field] = fields! {
-    flexspline.teeth: Count, from(20.0, 2000.0), "number of teeth, even";
-    flexspline.module_mm: Real, from(0.05, 10.0), "module, mm";
-    flexspline.profile: Word, NO_NUMBER,
-        "flanks of both wheels: involutes, or S-shaped for more teeth in contact \
-         (no pressure angle, a space made by its tooth)";
-    flexspline.pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
-    flexspline.profile_shift: Real, from(-2.0, 10.0), "profile shift, modules; positive: teeth stand further out";
-    flexspline.root_radius_mm: Real, above(0.0, 1000.0), "radius of the root circle, mm";
-    flexspline.tip_radius_mm: Real, above(0.0, 1000.0), "radius of the tip circle, mm";
-    flexspline.rim_thickness_mm: Real, above(0.0, 100.0), "rim under the root circle, mm";
-    flexspline.width_mm: Real, above(0.0, 1000.0), "face width, mm";
-    flexspline.root_fillet_mm: Real, from(0.002, 5.0), "radius of the root fillet, mm";
-    flexspline.tip_rounding_mm: Real, from(0.002, 5.0), "radius of the tip rounding, mm";
-    flexspline.face: Word, NO_NUMBER,
-        "how the load lies along the face: evenly, or by slices of teeth that lean as the rim tapers";
-    flexspline.taper_mrad: Real, from(-50.0, 50.0),
-        "taper of the teeth along the face, mrad; positive: further in toward the open end";
-    flexspline.crowning_um: Real, from(0.0, 500.0), "how far both ends of the face stand back from its middle, µm";
-    circular_spline.teeth: Count, from(22.0, 2002.0), "number of teeth, two more than the flexspline";
-    circular_spline.module_mm: Real, from(0.05, 10.0), "module, mm";
-    circular_spline.pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
-    circular_spline.profile_shift: Real, from(-2.0, 10.0), "profile shift of the space, modules; positive: further out";
-    circular_spline.root_radius_mm: Real, above(0.0, 1000.0), "radius of the root circle, mm";
-    circular_spline.tip_radius_mm: Real, above(0.0, 1000.0), "radius of the tip circle, mm";
-    circular_spline.outer_radius_mm: Real, above(0.0, 1000.0), "outer radius of the ring, held by the output, mm";
-    circular_spline.root_fillet_mm: Real, from(0.002, 5.0), "radius of the root fillet, mm";
-    circular_spline.tip_rounding_mm: Real, from(0.002, 5.0), "radius of the tip rounding, mm";
-    material.youngs_modulus_mpa: Real, from(100.0, 1.0e6), "Young's modulus, MPa";
-    material.poissons_ratio: Real, from(0.0, 0.49), "Poisson's ratio";
-    material.density_kg_m3: Real, from(100.0, 30_000.0), "density, kg/m^3";
-    generator.w0_mm: Real, above(0.0, 20.0), "radial displacement of the neutral layer on the major axis, outward, mm";
-    generator.roller_diameter_mm: Real, above(0.0, 1000.0), "diameter of each roller, mm";
-    generator.four_roller_angle_deg: Real, from(15.0, 38.0), "angle of the four rollers from the major axis, degrees";
-    generator.disc_half_angle_deg: Real, from(5.0, 50.0), "half the contact angle of a disc, degrees";
-    generator.bearing_stiffness_n_per_mm3: RealOrRigid, above(0.0, 1.0e7),
-        "pressure per approach of the generator bearing, N/mm^3";
-    output.drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, against its motion, N.m";
-    sleeve.kind: Word, NO_NUMBER, "what holds the rim, and in how many dimensions it is computed";
-    sleeve.wall_mm: Real, above(0.0, 100.0), "wall of the tubes, mm";
-    sleeve.flange_side_mm: Real, above(0.0, 10_000.0), "tube from rim to flange, mm (hermetic, hat)";
-    sleeve.bottom_side_mm: Real, above(0.0, 10_000.0),
-        "tube from rim to the outer face of the bottom, mm (hermetic, cup)";
-    sleeve.flange: Word, NO_NUMBER,
-        "how the tube stands on its flange: clamped, or on a thin plate clamped to it further out";
-    sleeve.bottom: Word, NO_NUMBER,
-        "what closes the tube: held in its plane and free axially, a plate, or a massive body";
-    sleeve.bottom_thickness_mm: Real, above(0.0, 100.0), "thickness of bottom = \"plate\", mm";
-    sleeve.diaphragm_thickness_mm: Real, above(0.0, 100.0), "thickness of flange = \"diaphragm\", mm";
-    sleeve.diaphragm_width_mm: Real, above(0.0, 1000.0), "from the tube to where a diaphragm is clamped, mm";
-    sleeve.hub_radius_mm: Real, above(0.0, 1000.0), "hub on which the plate of a cup is clamped, radius, mm";
-    sleeve.torsion_stiffness_n_m_per_rad: RealOrRigid, above(0.0, 1.0e12),
-        "torsional stiffness of springs, or of what holds shells, N.m/rad";
-    sleeve.lateral_stiffness_n_per_mm: Real, from(0.0, 1.0e9), "lateral stiffness of springs, rim to flange, N/mm";
-    flanks.friction_coefficient: Real, from(0.0, 0.5), "Coulomb friction between the flanks";
-    flanks.preload_um: Real, from(-50.0, 50.0),
-        "how much deeper the flanks mesh than drawn, along their normal, µm; positive: preloaded, negative: clearance";
-    temperature.reference_c: Real, from(-200.0, 300.0), "temperature at which the sizes hold, degrees C";
-    temperature.minimum_c: Real, from(-200.0, 300.0), "lowest operating temperature, degrees C";
-    temperature.maximum_c: Real, from(-200.0, 300.0), "highest operating temperature, degrees C";
-    temperature.flexspline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
-        "linear expansion of the flexspline, 1/K; positive: longer when warmer";
-    temperature.circular_spline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
-        "linear expansion of the circular spline, 1/K; positive: longer when warmer";
-    temperature.generator_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
-        "linear expansion of the generator, 1/K; positive: longer when warmer";
-    temperature.housing_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
-        "linear expansion of the circular spline's seat, 1/K; positive: longer when warmer";
-    temperature.youngs_modulus_per_k: Real, from(-0.001, 0.001),
-        "relative change of Young's modulus, 1/K; negative: softer when warmer";
-    as_built.circular_spline_eccentricity_um: Real, from(0.0, 100.0), "toothing beside the axis it turns about, µm";
-    as_built.circular_spline_eccentricity_phase_deg: Real, PHASE,
-        "whereto, degrees on the circular spline, positive counter-clockwise from space 0";
-    as_built.circular_spline_ovality_um: Real, from(0.0, 100.0), "amplitude of the oval, length kept, µm";
-    as_built.circular_spline_ovality_phase_deg: Real, PHASE,
-        "angle of a crest, degrees on the circular spline, positive counter-clockwise from space 0";
-    as_built.circular_spline_pitch_harmonics: Harmonics, from(0.0, 100.0),
-        "cumulative pitch error, positive counter-clockwise, [{ order, amplitude_um, phase_deg of a crest }, ...]";
-    as_built.circular_spline_pitch_error_um: List, from(-100.0, 100.0),
-        "position error of each space, or none, µm; positive counter-clockwise";
-    as_built.circular_spline_offset_um: Real, from(0.0, 100.0), "its axis beside that of the housing, µm";
-    as_built.circular_spline_offset_direction_deg: Real, PHASE,
-        "whereto, degrees in the housing, positive counter-clockwise from the major axis at generator angle 0";
-    as_built.flexspline_runout_um: Real, from(0.0, 100.0), "toothing beside the axis of the bore, µm";
-    as_built.flexspline_runout_phase_deg: Real, PHASE,
-        "whereto, degrees on the flexspline, positive counter-clockwise from tooth 0";
-    as_built.flexspline_pitch_harmonics: Harmonics, from(0.0, 100.0),
-        "cumulative pitch error, positive counter-clockwise, [{ order, amplitude_um, phase_deg of a crest }, ...]";
-    as_built.flexspline_pitch_error_um: List, from(-100.0, 100.0),
-        "position error of each tooth, or none, µm; positive counter-clockwise";
-    as_built.rim_thickness_harmonics: Harmonics, from(0.0, 1000.0),
-        "thickness of the rim, positive: thicker, [{ order, amplitude_um, phase_deg of a crest }, ...]";
-    as_built.generator_eccentricity_um: Real, from(0.0, 100.0), "generator beside the axis it turns about, µm";
-    as_built.generator_eccentricity_phase_deg: Real, PHASE,
-        "whereto, degrees on the generator, positive counter-clockwise from the major axis";
-    as_built.generator_lobe_asymmetry_um: Real, from(-100.0, 100.0),
-        "lobe at 0 degrees less that at 180, µm; positive: the one at 0 is higher";
-    as_built.cam_form_harmonics: Harmonics, from(0.0, 100.0),
-        "form error of the cam, positive outward, [{ order, amplitude_um, phase_deg of a crest }, ...]";
-    as_built.flexspline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
-    as_built.circular_spline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
-    as_built.damaged_teeth: Damage, DEPTH, "[{ wheel, tooth, flank = \"plus\", \"minus\" or \"both\", depth_um }, ...]";
-    as_built.generator_warmer_k: Real, from(-100.0, 100.0),
-        "generator less flexspline, K; positive: the generator is warmer";
-    as_built.circular_spline_warmer_k: Real, from(-100.0, 100.0),
-        "circular spline and its seat less flexspline, K; positive: they are warmer";
-};
+pub(super) fn all() -> impl Iterator<Item = &'static Field> {
+    SECTIONS.iter().flat_map(|section| section.fields)
+}
 
 impl Field {
     /// `(section, key)`.
@@ -291,7 +217,7 @@ impl Field {
 impl Drive {
     /// A number of the file by its path, `section.key`; none of another kind than a number.
     pub fn number_mut(&mut self, path: &str) -> Option<&mut f64> {
-        match ALL.iter().find(|field| field.path == path)?.slot(self) {
+        match all().find(|field| field.path == path)?.slot(self) {
             Slot::Real(number) => Some(number),
             _ => None,
         }
@@ -301,5 +227,5 @@ impl Drive {
 /// Calls `visit` with every field and its value.
 pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, Slot<'_>)) {
     let mut drive = drive.clone();
-    ALL.iter().for_each(|field| visit(field, field.slot(&mut drive)));
+    all().for_each(|field| visit(field, field.slot(&mut drive)));
 }

@@ -97,7 +97,7 @@ impl Drive {
             return Ok(());
         }
         let field =
-            fields::ALL.iter().find(|field| field.path == path).ok_or_else(|| Problem::of(path, unknown_path(path)))?;
+            fields::all().find(|field| field.path == path).ok_or_else(|| Problem::of(path, unknown_path(path)))?;
         // a bare word is a string
         match DeValue::parse(text) {
             Ok(value) => field.put(self, &value),
@@ -126,7 +126,8 @@ impl Drive {
         fields::for_each(drive, |field, slot| {
             let (section, key) = field.split();
             if section != open {
-                let about = fields::SECTIONS.iter().find(|(name, _)| *name == section).map_or("", |(_, about)| about);
+                let about =
+                    fields::SECTIONS.iter().find(|known| known.name == section).map_or("", |known| known.contents);
                 let _ = writeln!(text, "\n[{section}]  # {about}");
                 open = section;
             }
@@ -255,10 +256,10 @@ impl DriveReader<'_> {
             if ["base", "name", "extension", "data_sheet"].contains(&section) {
                 continue;
             }
-            let sections = || fields::SECTIONS.iter().map(|(name, _)| *name);
+            let sections = || fields::SECTIONS.iter().map(|section| section.name);
             if !sections().any(|known| known == section) {
                 let known = || sections().chain(["base", "name", "data_sheet"]);
-                let keys: Vec<&str> = fields::ALL.iter().map(|field| field.path).collect();
+                let keys: Vec<&str> = fields::all().map(|field| field.path).collect();
                 let meant = likeliest(section, known()).or_else(|| likeliest_path(section, &keys));
                 let hint = meant.map_or_else(String::new, |name| format!("; {}", question(name)));
                 let allowed = known().collect::<Vec<_>>().join(", ");
@@ -296,7 +297,7 @@ impl DriveReader<'_> {
         for (key, value) in entries {
             let name = key.get_ref().as_ref();
             let path = format!("{section}.{name}");
-            match fields::ALL.iter().find(|field| field.path == path) {
+            match fields::all().find(|field| field.path == path) {
                 None => self.file.refuse(key.span(), &path, unknown_path(&path)),
                 Some(field) => {
                     self.lines.insert(field.path, self.file.line(key.span().start));
@@ -313,7 +314,7 @@ impl DriveReader<'_> {
     }
 
     fn refuse_missing(&mut self, drive: &Drive) {
-        for field in fields::ALL {
+        for field in fields::all() {
             if !field.is_optional(drive) && !self.lines.contains_key(field.path) {
                 let what = format!("missing ({}); give it, or a base = \"HHD-95\" to start from", field.meaning);
                 self.file.refuse_whole(field.path, what);
@@ -350,12 +351,11 @@ fn apart(text: &str) -> Vec<&str> {
 /// Message for a path that is no field.
 fn unknown_path(path: &str) -> String {
     let section = path.split_once('.').map_or("", |(section, _)| section);
-    let paths: Vec<&str> = fields::ALL.iter().map(|field| field.path).collect();
+    let paths: Vec<&str> = fields::all().map(|field| field.path).collect();
     let hint = likeliest_path(path, &paths).map_or_else(String::new, |path| format!("; {}", question(path)));
-    let known: Vec<&str> =
-        fields::ALL.iter().map(Field::split).filter(|(s, _)| *s == section).map(|(_, key)| key).collect();
+    let known: Vec<&str> = fields::all().map(Field::split).filter(|(s, _)| *s == section).map(|(_, key)| key).collect();
     if known.is_empty() {
-        let sections: Vec<&str> = fields::SECTIONS.iter().map(|(name, _)| *name).collect();
+        let sections: Vec<&str> = fields::SECTIONS.iter().map(|section| section.name).collect();
         return format!("unknown key{hint}; allowed: SECTION.KEY, sections are {}", sections.join(", "));
     }
     format!("unknown key{hint}; allowed: {}", known.join(", "))
@@ -728,13 +728,13 @@ mod tests {
              the major axis, outward, mm); give it, or a base = \"HHD-95\" to start from"
         );
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
-        let count = |of: &dyn Fn(&Field) -> bool| fields::ALL.iter().filter(|field| of(field)).count();
+        let count = |of: &dyn Fn(&Field) -> bool| fields::all().filter(|field| of(field)).count();
         let optional = count(&|field| field.is_optional(&Drive::hhd_95()));
         // Two stiffnesses that may be rigid, what springs have not, what straight teeth have not, and what involutes
         // have not.
         let not_there = [Field::is_imperfection, Field::is_of_shells, Field::is_of_the_face, Field::is_of_the_profile];
         assert_eq!(optional, 2 + not_there.iter().map(|of| count(&|field| of(field))).sum::<usize>());
-        assert_eq!(empty.problems.len(), fields::ALL.len() - optional);
+        assert_eq!(empty.problems.len(), fields::all().count() - optional);
         // a stiffness that is not there is rigid
         let text = text.replace("bearing_stiffness_n_per_mm3", "# ").replace("torsion_stiffness_n_m_per_rad", "# ");
         assert_eq!(Drive::from_toml("g.toml", &text).unwrap(), Drive::hhd_95());

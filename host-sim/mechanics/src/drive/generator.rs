@@ -11,6 +11,7 @@
 
 use super::as_built::{Harmonic, direction};
 use super::error::DriveError;
+use super::interference::halved;
 use super::neutral::NeutralCurve;
 use super::ring::{GeneratorKind, RingShape};
 use super::spec::Drive;
@@ -100,8 +101,7 @@ impl GeneratorOutline {
         };
         if let Contour::Circles { lobe: [x, y], radius, .. } = contour {
             let apart = if kind == GeneratorKind::FourRoller { x.min(y) } else { x };
-            let rollers = matches!(kind, GeneratorKind::TwoRoller | GeneratorKind::FourRoller);
-            if rollers && apart <= radius {
+            if kind.has_rollers() && apart <= radius {
                 return Err(Problem::of(
                     "generator.roller_diameter_mm",
                     format!(
@@ -278,16 +278,9 @@ impl GeneratorOutline {
         };
         let at = |k: usize| TAU * k as f64 / SCAN as f64;
         let best = (0..SCAN).min_by(|&i, &j| squared(at(i)).total_cmp(&squared(at(j)))).unwrap_or(0);
-        let (mut low, mut high) = (at(best) - at(1), at(best) + at(1));
         // (p - P)·P' falls through zero at the closest point
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if self.foot_residual(px, py, middle.sin_cos()).0 > 0.0 {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        let before = |alpha: f64| self.foot_residual(px, py, alpha.sin_cos()).0 > 0.0;
+        let [low, high] = halved(at(best) - at(1), at(best) + at(1), before);
         0.5 * (low + high)
     }
 }

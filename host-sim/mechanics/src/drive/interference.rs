@@ -371,6 +371,15 @@ fn at_phase(cycle: &[Option<LeastGap>], phi: f64) -> Option<LeastGap> {
     })
 }
 
+/// The ends of a range after sixty halvings, to the last digit: `is_low` holds below the place sought.
+pub(crate) fn halved(mut low: f64, mut high: f64, is_low: impl Fn(f64) -> bool) -> [f64; 2] {
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if is_low(middle) { low = middle } else { high = middle }
+    }
+    [low, high]
+}
+
 /// Argument of the least value of a function with one valley between `low` and `high`.
 pub(crate) fn golden(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let section = 0.5 * (5f64.sqrt() - 1.0);

@@ -51,6 +51,11 @@ impl GeneratorKind {
         }
     }
 
+    /// Whether it touches the bore at rollers alone.
+    pub(crate) const fn has_rollers(self) -> bool {
+        matches!(self, Self::TwoRoller | Self::FourRoller)
+    }
+
     /// Largest load (N m) that tables, kernels and closed loops are made for unless set otherwise: up to where the
     /// model holds with the rim of HHD-95. Rollers leave the rim unsupported: beyond these loads teeth slip or no
     /// equilibrium is found.

@@ -3,6 +3,8 @@
 use serde::{Serialize, Serializer};
 
 use super::error::Misfits;
+use super::fields::{NO_NUMBER, section};
+use crate::toml_file::{above, from};
 
 /// A choice among names in a drive file.
 pub(super) trait Choice {
@@ -117,34 +119,39 @@ choice! {
     }
 }
 
-/// The sleeve of the flexspline.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Sleeve {
+section! {
+    /// The sleeve of the flexspline.
+    Sleeve = sleeve,
+        "what holds the rim of the flexspline: shells (hermetic: rim between two tubes; cup; hat: tube and flange), \
+         springs or nothing";
     /// Support of the rim.
-    pub kind: SleeveKind,
+    kind: Word(SleeveKind), NO_NUMBER, "what holds the rim, and in how many dimensions it is computed";
     /// Wall of the tubes, mm.
-    pub wall_mm: f64,
+    wall_mm: Real, above(0.0, 100.0), "wall of the tubes, mm";
     /// From the rim to the flange, mm (hermetic sleeve, hat).
-    pub flange_side_mm: f64,
+    flange_side_mm: Real, above(0.0, 10_000.0), "tube from rim to flange, mm (hermetic, hat)";
     /// From the rim to the outer face of the bottom, mm (hermetic sleeve, cup).
-    pub bottom_side_mm: f64,
+    bottom_side_mm: Real, above(0.0, 10_000.0), "tube from rim to the outer face of the bottom, mm (hermetic, cup)";
     /// How the tube stands on its flange.
-    pub flange: Flange,
+    flange: Word(Flange), NO_NUMBER,
+        "how the tube stands on its flange: clamped, or on a thin plate clamped to it further out";
     /// End of the other tube.
-    pub bottom: Bottom,
+    bottom: Word(Bottom), NO_NUMBER,
+        "what closes the tube: held in its plane and free axially, a plate, or a massive body";
     /// Thickness of a bottom that is a plate, mm.
-    pub bottom_thickness_mm: f64,
+    bottom_thickness_mm: Real, above(0.0, 100.0), "thickness of bottom = \"plate\", mm";
     /// Thickness of a flange that is a diaphragm, mm.
-    pub diaphragm_thickness_mm: f64,
+    diaphragm_thickness_mm: Real, above(0.0, 100.0), "thickness of flange = \"diaphragm\", mm";
     /// How far outside the tube a diaphragm is clamped, mm.
-    pub diaphragm_width_mm: f64,
+    diaphragm_width_mm: Real, above(0.0, 1000.0), "from the tube to where a diaphragm is clamped, mm";
     /// Radius of the hub on which the bottom of a cup is clamped, mm.
-    pub hub_radius_mm: f64,
+    hub_radius_mm: Real, above(0.0, 1000.0), "hub on which the plate of a cup is clamped, radius, mm";
     /// Torsional stiffness, N·m/rad, of springs in place of the sleeve, or of what holds a sleeve of shells; `None` is
     /// rigid.
-    pub torsion_stiffness_n_m_per_rad: Option<f64>,
+    torsion_stiffness_n_m_per_rad: RealOrRigid, above(0.0, 1.0e12),
+        "torsional stiffness of springs, or of what holds shells, N.m/rad";
     /// Lateral stiffness of springs in place of the sleeve, N/mm; 0 leaves the rim to the generator.
-    pub lateral_stiffness_n_per_mm: f64,
+    lateral_stiffness_n_per_mm: Real, from(0.0, 1.0e9), "lateral stiffness of springs, rim to flange, N/mm";
 }
 
 impl Default for Sleeve {

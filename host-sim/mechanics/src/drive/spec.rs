@@ -2,12 +2,12 @@
 
 use super::as_built::{AsBuilt, DamagedFlank, Harmonic, Wheel};
 use super::error::{DriveError, Misfits};
-use super::fields::{self, Slot};
+use super::fields::{self, NO_NUMBER, Slot, section};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
 use super::sleeve::{Bottom, FaceLoad, Profile, Sleeve, SleeveKind};
 use super::tooth::ToothFlank;
-use crate::toml_file::Problem;
+use crate::toml_file::{Problem, above, from};
 use serde::Serialize;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -41,125 +41,136 @@ pub struct Drive {
     pub thermal_state: ThermalState,
 }
 
-/// The toothed rim of the flexspline, undeformed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Flexspline {
+section! {
+    /// The toothed rim of the flexspline, undeformed.
+    Flexspline = flexspline, "the thin wheel with external teeth, undeformed; held by its sleeve";
     /// Number of teeth, even.
-    pub teeth: u32,
+    teeth: Count, from(20.0, 2000.0), "number of teeth, even";
     /// Module, mm.
-    pub module_mm: f64,
+    module_mm: Real, from(0.05, 10.0), "module, mm";
     /// The form of the flanks, of both wheels.
-    pub profile: Profile,
+    profile: Word(Profile), NO_NUMBER,
+        "flanks of both wheels: involutes, or S-shaped for more teeth in contact \
+         (no pressure angle, a space made by its tooth)";
     /// Pressure angle of the basic rack, degrees; S-shaped flanks have none.
-    pub pressure_angle_deg: f64,
+    pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
     /// Profile shift, in modules: how far the pitch circle of an S-shaped tooth stands outside of `module teeth / 2`.
-    pub profile_shift: f64,
+    profile_shift: Real, from(-2.0, 10.0), "profile shift, modules; positive: teeth stand further out";
     /// Radius of the root circle, mm.
-    pub root_radius_mm: f64,
+    root_radius_mm: Real, above(0.0, 1000.0), "radius of the root circle, mm";
     /// Radius of the tip circle, mm.
-    pub tip_radius_mm: f64,
+    tip_radius_mm: Real, above(0.0, 1000.0), "radius of the tip circle, mm";
     /// Rim under the root circle, mm.
-    pub rim_thickness_mm: f64,
+    rim_thickness_mm: Real, above(0.0, 100.0), "rim under the root circle, mm";
     /// Face width, mm; the plane-strain model carries torque over it.
-    pub width_mm: f64,
+    width_mm: Real, above(0.0, 1000.0), "face width, mm";
     /// Radius of the root fillet, mm.
-    pub root_fillet_mm: f64,
+    root_fillet_mm: Real, from(0.002, 5.0), "radius of the root fillet, mm";
     /// Radius of the tip rounding, mm.
-    pub tip_rounding_mm: f64,
+    tip_rounding_mm: Real, from(0.002, 5.0), "radius of the tip rounding, mm";
     /// How the load lies along the face; `even` takes taper, crowning and the cone of a rim in its sleeve for nothing.
-    pub face: FaceLoad,
+    face: Word(FaceLoad), NO_NUMBER,
+        "how the load lies along the face: evenly, or by slices of teeth that lean as the rim tapers";
     /// Taper of the teeth along the face, mrad; positive: they stand further in toward the open end, away from what
     /// holds the flexspline, and further out at the other, the middle of the face being as drawn.
-    pub taper_mrad: f64,
+    taper_mrad: Real, from(-50.0, 50.0),
+        "taper of the teeth along the face, mrad; positive: further in toward the open end";
     /// How far both ends of the face stand back from the flank in its middle, along its normal, µm; a parabola.
-    pub crowning_um: f64,
+    crowning_um: Real, from(0.0, 500.0), "how far both ends of the face stand back from its middle, µm";
 }
 
-/// The circular spline; profile shift and half-thickness law describe its spaces.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CircularSpline {
+section! {
+    /// The circular spline; profile shift and half-thickness law describe its spaces.
+    CircularSpline = circular_spline, "the ring with internal teeth; the output";
     /// Number of teeth: two more than the flexspline.
-    pub teeth: u32,
+    teeth: Count, from(22.0, 2002.0), "number of teeth, two more than the flexspline";
     /// Module, mm.
-    pub module_mm: f64,
+    module_mm: Real, from(0.05, 10.0), "module, mm";
     /// Pressure angle of the basic rack, degrees; S-shaped flanks have none.
-    pub pressure_angle_deg: f64,
+    pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
     /// Profile shift of the space, in modules; of an S-shaped one nothing, since the flexspline makes it.
-    pub profile_shift: f64,
+    profile_shift: Real, from(-2.0, 10.0), "profile shift of the space, modules; positive: further out";
     /// Radius of the root circle, mm (outside the tip circle).
-    pub root_radius_mm: f64,
+    root_radius_mm: Real, above(0.0, 1000.0), "radius of the root circle, mm";
     /// Radius of the tip circle, mm.
-    pub tip_radius_mm: f64,
+    tip_radius_mm: Real, above(0.0, 1000.0), "radius of the tip circle, mm";
     /// Outer radius of the ring, mm, where the output holds it.
-    pub outer_radius_mm: f64,
+    outer_radius_mm: Real, above(0.0, 1000.0), "outer radius of the ring, held by the output, mm";
     /// Radius of the root fillet, mm.
-    pub root_fillet_mm: f64,
+    root_fillet_mm: Real, from(0.002, 5.0), "radius of the root fillet, mm";
     /// Radius of the tip rounding, mm.
-    pub tip_rounding_mm: f64,
+    tip_rounding_mm: Real, from(0.002, 5.0), "radius of the tip rounding, mm";
 }
 
-/// Linear elastic steel at reference temperature.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Material {
+section! {
+    /// Linear elastic steel at reference temperature.
+    Material = material, "of both wheels";
     /// Young's modulus, MPa.
-    pub youngs_modulus_mpa: f64,
+    youngs_modulus_mpa: Real, from(100.0, 1.0e6), "Young's modulus, MPa";
     /// Poisson's ratio.
-    pub poissons_ratio: f64,
+    poissons_ratio: Real, from(0.0, 0.49), "Poisson's ratio";
     /// Density, kg/m³.
-    pub density_kg_m3: f64,
+    density_kg_m3: Real, from(100.0, 30_000.0), "density, kg/m^3";
 }
 
-/// Sizes of the wave generators, at reference temperature.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Generators {
+section! {
+    /// Sizes of the wave generators, at reference temperature.
+    Generators = generator, "of all four wave generators; each takes what it has";
     /// Radial displacement of the neutral layer on the major axis, mm.
-    pub w0_mm: f64,
+    w0_mm: Real, above(0.0, 20.0), "radial displacement of the neutral layer on the major axis, outward, mm";
     /// Diameter of each roller, mm (two-roller and four-roller).
-    pub roller_diameter_mm: f64,
+    roller_diameter_mm: Real, above(0.0, 1000.0), "diameter of each roller, mm";
     /// Angle of each of the four rollers from the major axis, degrees, in undeformed material.
-    pub four_roller_angle_deg: f64,
+    four_roller_angle_deg: Real, from(15.0, 38.0), "angle of the four rollers from the major axis, degrees";
     /// Half the angle over which a disc touches, degrees.
-    pub disc_half_angle_deg: f64,
+    disc_half_angle_deg: Real, from(5.0, 50.0), "half the contact angle of a disc, degrees";
     /// Pressure per approach of the generator's bearing, N/mm³; `None` is rigid.
-    pub bearing_stiffness_n_per_mm3: Option<f64>,
+    bearing_stiffness_n_per_mm3: RealOrRigid, above(0.0, 1.0e7),
+        "pressure per approach of the generator bearing, N/mm^3";
 }
 
-/// The output side.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OutputLoadPath {
+section! {
+    /// The output side.
+    OutputLoadPath = output, "what brakes the output beside its load";
     /// Coulomb drag on the circular spline, N·m, against its motion.
-    pub drag_torque_n_m: f64,
+    drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, against its motion, N.m";
 }
 
-/// Contact between the flanks.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Flanks {
+section! {
+    /// Contact between the flanks.
+    Flanks = flanks, "where the teeth touch";
     /// Coulomb friction coefficient.
-    pub friction_coefficient: f64,
+    friction_coefficient: Real, from(0.0, 0.5), "Coulomb friction between the flanks";
     /// How much deeper the flanks mesh than drawn, along their normal, on both sides of each tooth, µm; positive: less
     /// clearance, more preload.
-    pub preload_um: f64,
+    preload_um: Real, from(-50.0, 50.0),
+        "how much deeper the flanks mesh than drawn, along their normal, µm; positive: preloaded, negative: clearance";
 }
 
-/// How sizes and stiffness follow the temperature.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Temperature {
+section! {
+    /// How sizes and stiffness follow the temperature.
+    Temperature = temperature, "what warmth changes";
     /// Temperature at which the sizes hold, °C.
-    pub reference_c: f64,
+    reference_c: Real, from(-200.0, 300.0), "temperature at which the sizes hold, degrees C";
     /// Lowest operating temperature, °C.
-    pub minimum_c: f64,
+    minimum_c: Real, from(-200.0, 300.0), "lowest operating temperature, degrees C";
     /// Highest operating temperature, °C.
-    pub maximum_c: f64,
+    maximum_c: Real, from(-200.0, 300.0), "highest operating temperature, degrees C";
     /// Linear expansion of the flexspline, 1/K.
-    pub flexspline_expansion_per_k: f64,
+    flexspline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
+        "linear expansion of the flexspline, 1/K; positive: longer when warmer";
     /// Linear expansion of the circular spline, 1/K.
-    pub circular_spline_expansion_per_k: f64,
+    circular_spline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
+        "linear expansion of the circular spline, 1/K; positive: longer when warmer";
     /// Linear expansion of the generator, 1/K.
-    pub generator_expansion_per_k: f64,
+    generator_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
+        "linear expansion of the generator, 1/K; positive: longer when warmer";
     /// Linear expansion of the part that holds the circular spline, 1/K.
-    pub housing_expansion_per_k: f64,
+    housing_expansion_per_k: Real, from(-1.0e-5, 1.0e-4),
+        "linear expansion of the circular spline's seat, 1/K; positive: longer when warmer";
     /// Relative change of Young's modulus, 1/K.
-    pub youngs_modulus_per_k: f64,
+    youngs_modulus_per_k: Real, from(-0.001, 0.001),
+        "relative change of Young's modulus, 1/K; negative: softer when warmer";
 }
 
 /// Where a drive stands against its own reference temperature: size now over size there.
@@ -489,7 +500,7 @@ impl Drive {
     fn in_thermal_state(&self, new: ThermalState) -> Drive {
         let mut drive = self.clone();
         let (t, old, rise) = (&self.temperature, self.thermal_state, new.above_reference_k);
-        for field in fields::ALL {
+        for field in fields::all() {
             let (section, key) = field.split();
             let scale = match section {
                 "flexspline" | "sleeve" => new.flexspline_scale / old.flexspline_scale,
@@ -627,7 +638,8 @@ impl Drive {
         let allowed = format!(", allowed: up to {largest:.4} (a twentieth of the neutral radius)");
         misfits.require(w0 <= largest, "generator.w0_mm", allowed);
         let meets_root = format!(
-            ": with w0_mm = {w0} the tip would stand in the circular-spline root at the major axis; allowed: below {:.4}",
+            ": with w0_mm = {w0} the tip would stand in the circular-spline root at the major axis; allowed: \
+             below {:.4}",
             c.root_radius_mm - w0
         );
         misfits.require(f.tip_radius_mm + w0 < c.root_radius_mm, "flexspline.tip_radius_mm", meets_root);
@@ -778,7 +790,7 @@ mod tests {
     #[test]
     fn the_ends_of_every_range_are_refused_or_work() {
         let (mut refused, mut sound) = (0, 0);
-        for field in fields::ALL {
+        for field in fields::all() {
             for end in [field.range.low, field.range.high] {
                 let set = format!("{}={end}", field.path);
                 match Drive::hhd_95().with_set(&set) {

@@ -23,6 +23,7 @@
 
 use super::arcs::ArcChain;
 use super::error::DriveError;
+use super::interference::halved;
 use super::s_tooth;
 use super::sleeve::Profile;
 use super::spec::Drive;
@@ -74,16 +75,9 @@ enum ToothCurve {
         start: f64,
         sweep: f64,
     },
-    /// Roll angle from `from` to `to`; `half_base` is the half angle at the base circle.
-    Involute {
-        base_radius: f64,
-        half_base: f64,
-        from: f64,
-        to: f64,
-    },
-    /// Arc length of the chain from `from` to `to`.
-    Chain {
-        chain: Arc<ArcChain>,
+    /// From `from` to `to`: roll angle of an involute, arc length of a chain.
+    Flank {
+        shape: FlankShape,
         from: f64,
         to: f64,
     },
@@ -93,13 +87,13 @@ impl OutlinePiece {
     /// Point, mm.
     pub fn point(&self, t: f64) -> [f64; 2] {
         match self.curve {
-            ToothCurve::Chain { ref chain, from, to } => chain.point(from + t * (to - from)),
+            ToothCurve::Flank { shape: FlankShape::Chain(ref chain), from, to } => chain.point(from + t * (to - from)),
             ToothCurve::Arc { centre, radius, start, sweep } => {
                 let (s, c) = (start + t * sweep).sin_cos();
                 [centre[0] + radius * c, centre[1] + radius * s]
             }
-            ToothCurve::Involute { base_radius, half_base, .. } => {
-                let u = self.roll(t);
+            ToothCurve::Flank { shape: FlankShape::Involute { base_radius, half_base }, from, to } => {
+                let u = roll(from, to, t);
                 let (s, c) = (half_base - u).sin_cos();
                 [base_radius * (c - u * s), base_radius * (s + u * c)]
             }
@@ -109,7 +103,7 @@ impl OutlinePiece {
     /// Unit tangent in the direction of growing `t`.
     pub(crate) fn tangent(&self, t: f64) -> [f64; 2] {
         match self.curve {
-            ToothCurve::Chain { ref chain, from, to } => {
+            ToothCurve::Flank { shape: FlankShape::Chain(ref chain), from, to } => {
                 chain.tangent(from + t * (to - from)).map(|x| (to - from).signum() * x)
             }
             ToothCurve::Arc { start, sweep, .. } => {
@@ -117,8 +111,8 @@ impl OutlinePiece {
                 let sign = sweep.signum();
                 [-sign * s, sign * c]
             }
-            ToothCurve::Involute { half_base, from, to, .. } => {
-                let (s, c) = (half_base - self.roll(t)).sin_cos();
+            ToothCurve::Flank { shape: FlankShape::Involute { half_base, .. }, from, to } => {
+                let (s, c) = (half_base - roll(from, to, t)).sin_cos();
                 let sign = (to - from).signum();
                 [sign * c, sign * s]
             }
@@ -134,29 +128,31 @@ impl OutlinePiece {
     /// Curvature, 1/mm, positive where the material is convex.
     pub(crate) fn curvature(&self, t: f64) -> f64 {
         match self.curve {
-            ToothCurve::Chain { ref chain, from, to } => {
+            ToothCurve::Flank { shape: FlankShape::Chain(ref chain), from, to } => {
                 -(to - from).signum() * chain.curvature(from + t * (to - from))
             }
             ToothCurve::Arc { radius, sweep, .. } => -sweep.signum() / radius,
-            ToothCurve::Involute { base_radius, from, to, .. } => (to - from).signum() / (base_radius * self.roll(t)),
+            ToothCurve::Flank { shape: FlankShape::Involute { base_radius, .. }, from, to } => {
+                (to - from).signum() / (base_radius * roll(from, to, t))
+            }
         }
     }
 
     /// Length, mm.
     pub fn length(&self) -> f64 {
         match self.curve {
-            ToothCurve::Chain { from, to, .. } => (to - from).abs(),
+            ToothCurve::Flank { shape: FlankShape::Chain(_), from, to } => (to - from).abs(),
             ToothCurve::Arc { radius, sweep, .. } => radius * sweep.abs(),
-            ToothCurve::Involute { base_radius, from, to, .. } => 0.5 * base_radius * (to * to - from * from).abs(),
+            ToothCurve::Flank { shape: FlankShape::Involute { base_radius, .. }, from, to } => {
+                0.5 * base_radius * (to * to - from * from).abs()
+            }
         }
     }
+}
 
-    fn roll(&self, t: f64) -> f64 {
-        match self.curve {
-            ToothCurve::Involute { from, to, .. } => (from * from + t * (to * to - from * from)).sqrt(),
-            ToothCurve::Arc { .. } | ToothCurve::Chain { .. } => 0.0,
-        }
-    }
+/// Roll angle at a part `t` of the length of an involute.
+fn roll(from: f64, to: f64, t: f64) -> f64 {
+    (from * from + t * (to * to - from * from)).sqrt()
 }
 
 /// One half of the outline of a tooth (external) or of a space (internal), root to tip, on the positive-angle side.
@@ -261,32 +257,20 @@ impl ToothFlank {
             curve: ToothCurve::Arc { centre, radius, start, sweep: end - start },
         };
         let (from, to) = (root.along, tip.along);
-        let curve = match &wheel.shape {
-            &FlankShape::Involute { base_radius, half_base } => {
-                ToothCurve::Involute { base_radius, half_base, from, to }
-            }
-            FlankShape::Chain(chain) => ToothCurve::Chain { chain: Arc::clone(chain), from, to },
-        };
-        let flank = OutlinePiece { kind: PieceKind::Flank, curve };
-        let (root_beta, tip_beta) = (root.direction, tip.direction);
+        let flank = ToothCurve::Flank { shape: wheel.shape.clone(), from, to };
+        // The outline of a tooth begins in the middle of the root land and ends on the axis, that of a space the other
+        // way round; fillet and rounding change places with the side of the material.
+        let (begins, ends) = if internal { (0.0, half_pitch) } else { (half_pitch, 0.0) };
+        let (fillet_back, rounding_back) = if internal { (0.0, PI) } else { (PI, 0.0) };
+        let (fillet_ends, rounding_begins) = (root.direction - side * FRAC_PI_2, tip.direction + side * FRAC_PI_2);
         let origin = [0.0, 0.0];
-        let pieces = if internal {
-            [
-                arc(PieceKind::RootLand, origin, root_radius, 0.0, root.angle),
-                arc(PieceKind::RootFillet, root.centre, fillet, root.angle, root_beta + FRAC_PI_2),
-                flank,
-                arc(PieceKind::TipRounding, tip.centre, rounding, tip_beta - FRAC_PI_2, tip.angle - PI),
-                arc(PieceKind::TipLand, origin, tip_radius, tip.angle, half_pitch),
-            ]
-        } else {
-            [
-                arc(PieceKind::RootLand, origin, root_radius, half_pitch, root.angle),
-                arc(PieceKind::RootFillet, root.centre, fillet, root.angle - PI, root_beta - FRAC_PI_2),
-                flank,
-                arc(PieceKind::TipRounding, tip.centre, rounding, tip_beta + FRAC_PI_2, tip.angle),
-                arc(PieceKind::TipLand, origin, tip_radius, tip.angle, 0.0),
-            ]
-        };
+        let pieces = [
+            arc(PieceKind::RootLand, origin, root_radius, begins, root.angle),
+            arc(PieceKind::RootFillet, root.centre, fillet, root.angle - fillet_back, fillet_ends),
+            OutlinePiece { kind: PieceKind::Flank, curve: flank },
+            arc(PieceKind::TipRounding, tip.centre, rounding, rounding_begins, tip.angle - rounding_back),
+            arc(PieceKind::TipLand, origin, tip_radius, tip.angle, ends),
+        ];
         let circles = (root_radius, tip_radius);
         Ok(ToothFlank { pieces, shape: wheel.shape.clone(), circles, internal, teeth: wheel.teeth })
     }
@@ -341,11 +325,11 @@ impl ToothFlank {
             })
             .unwrap_or(&self.pieces[3]);
         Some(match piece.curve {
-            ToothCurve::Chain { ref chain, .. } => {
+            ToothCurve::Flank { shape: FlankShape::Chain(ref chain), .. } => {
                 let [x, y] = chain.point(chain.arc_at_radius(radius));
                 y.atan2(x)
             }
-            ToothCurve::Involute { base_radius, half_base, .. } => {
+            ToothCurve::Flank { shape: FlankShape::Involute { base_radius, half_base }, .. } => {
                 let u = ((radius / base_radius).powi(2) - 1.0).max(0.0).sqrt();
                 half_base - (u - u.atan())
             }
@@ -426,18 +410,11 @@ impl WheelNumbers {
                     x.hypot(y) - distance
                 };
                 // The parallel curve grows in radius where the flank does, unless the corner is rounder than the flank.
-                let (mut low, mut high) = (-rho, chain.length() + rho);
+                let (low, high) = (-rho, chain.length() + rho);
                 if beyond(low) >= 0.0 || beyond(high) <= 0.0 {
                     return Err(self.refuse(field, rho, &format!("meets no flank at the circle of {radius:.4} mm")));
                 }
-                for _ in 0..60 {
-                    let middle = 0.5 * (low + high);
-                    if beyond(middle) > 0.0 {
-                        high = middle;
-                    } else {
-                        low = middle;
-                    }
-                }
+                let [low, _] = halved(low, high, |s| beyond(s) <= 0.0);
                 let (centre, t) = (offset(low), chain.tangent(low));
                 Ok(Corner { centre, angle: centre[1].atan2(centre[0]), along: low, direction: t[1].atan2(t[0]) })
             }

@@ -233,22 +233,14 @@ pub fn cauchy_stress(points: &[GaussPoint; 4], material: &PlaneStrain, u: &[f64;
 /// Values at the four integration points carried to the eight nodes by the bilinear field through them.
 pub fn extrapolate_to_nodes(values: &[f64; 4]) -> [f64; 8] {
     let r = 3.0_f64.sqrt();
-    let at = |xi: f64, eta: f64| {
+    let at = |[xi, eta]: [f64; 2]| {
         0.25 * (values[0] * (1.0 - r * xi) * (1.0 - r * eta)
             + values[1] * (1.0 + r * xi) * (1.0 - r * eta)
             + values[2] * (1.0 + r * xi) * (1.0 + r * eta)
             + values[3] * (1.0 - r * xi) * (1.0 + r * eta))
     };
-    [
-        at(-1.0, -1.0),
-        at(1.0, -1.0),
-        at(1.0, 1.0),
-        at(-1.0, 1.0),
-        at(0.0, -1.0),
-        at(1.0, 0.0),
-        at(0.0, 1.0),
-        at(-1.0, 0.0),
-    ]
+    // Corners, then the middles of the edges.
+    [[-1, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0]].map(|node| at(node.map(f64::from)))
 }
 
 #[cfg(test)]

@@ -63,12 +63,11 @@ impl Pattern {
         let mut rows = Vec::new();
         for (node, list) in neighbours.iter().enumerate() {
             let x = 2 * node as u32;
-            column_starts.push(rows.len() as u32);
-            rows.extend([x, x + 1]);
-            rows.extend(list.iter().flat_map(|&n| [2 * n, 2 * n + 1]));
-            column_starts.push(rows.len() as u32);
-            rows.push(x + 1);
-            rows.extend(list.iter().flat_map(|&n| [2 * n, 2 * n + 1]));
+            for own in [x, x + 1] {
+                column_starts.push(rows.len() as u32);
+                rows.extend(own..x + 2);
+                rows.extend(list.iter().flat_map(|&n| [2 * n, 2 * n + 1]));
+            }
         }
         column_starts.push(rows.len() as u32);
         Pattern { column_starts, rows }

@@ -25,7 +25,7 @@ use crate::suggest::UnknownName;
 /// root land; rows of the rim below the interface circle; rows between the interface circle and the fillet; elements on
 /// the upper half of the fillet; elements on the flank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MeshDensity(pub(super) [usize; 6]);
+pub struct MeshDensity(pub [usize; 6]);
 
 impl MeshDensity {
     /// Multiple of the elements in each direction.

@@ -160,13 +160,7 @@ impl HalfSector {
         let tip_corner = tooth_right[tooth_right.len() - 1];
         let tip_angle = tip_corner[1].atan2(tip_corner[0]);
         let tip = sample(tooth_columns, |t| polar(outline.tip_radius, tip_angle * t));
-        let tooth_left: SidePoints = tooth_right
-            .iter()
-            .map(|p| {
-                let r = p[0].hypot(p[1]);
-                [r, 0.0]
-            })
-            .collect();
+        let tooth_left: SidePoints = tooth_right.iter().map(|p| [p[0].hypot(p[1]), 0.0]).collect();
         let tooth = transfinite(&interface_tooth, &tip, &tooth_left, &tooth_right);
 
         // C: foot of the fillet and root land, from interface to outline.

@@ -22,6 +22,11 @@ impl Symmetric {
         self.entries[i * self.size + j]
     }
 
+    /// The first rows and columns.
+    pub fn array<const N: usize>(&self) -> [[f64; N]; N] {
+        std::array::from_fn(|i| std::array::from_fn(|j| self.at(i, j)))
+    }
+
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         self.entries[i * self.size + j] += value;
     }

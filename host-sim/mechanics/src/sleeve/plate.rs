@@ -53,11 +53,7 @@ impl Plate {
             let element = self.element(radius(k), radius(k + 1), n);
             let mut front = Symmetric::zeros(2 * NODE);
             front.add_at(&element, std::array::from_fn(|i| i));
-            for i in 0..NODE {
-                for j in 0..NODE {
-                    front.add(i, j, beyond.at(i, j));
-                }
-            }
+            front.add_at(&beyond.array::<NODE>(), std::array::from_fn(|i| i));
             let fixed: &[usize] = if held && k == 0 { &[U, V, W, SLOPE] } else { &[] };
             beyond = front.condensed(&std::array::from_fn::<usize, NODE, _>(|i| NODE + i), fixed);
         }

@@ -51,19 +51,14 @@ impl Tube {
         for _ in 0..elements {
             let mut front = Symmetric::zeros(2 * NODE);
             front.add_at(&element, std::array::from_fn(|i| i));
-            for i in 0..NODE {
-                for j in 0..NODE {
-                    front.add(NODE + i, NODE + j, beyond.at(i, j));
-                }
-            }
+            front.add_at(&beyond.array::<NODE>(), std::array::from_fn(|i| NODE + i));
             let near: Vec<usize> = (0..NODE).collect();
             let fixed: Vec<usize> = held.iter().map(|i| NODE + i).collect();
             beyond = front.condensed(&near, &fixed);
             held.clear();
         }
         // The wall of the rim is another: U' and V' of this one are its own.
-        let edge = beyond.condensed(&[U, V, W, SLOPE], &[]);
-        std::array::from_fn(|i| std::array::from_fn(|j| edge.at(i, j)))
+        beyond.condensed(&[U, V, W, SLOPE], &[]).array()
     }
 }
 

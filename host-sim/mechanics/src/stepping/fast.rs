@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::condense::{
     CellAt, CellPlacement, CellState, CellTangent, Chain, ChainBlock, CoRotation, CondensedWheel, Contribution,
-    DenseKernels, Geometric, Traction, back, one, one_mut, rotate_pairs, rotate_sides,
+    DenseKernels, Geometric, Traction, Turn, back, one, one_mut, rotate_pairs, rotate_sides,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
@@ -36,9 +36,6 @@ pub struct CondensedDrive {
     frames: [Vec<Turn>; 2],
     faces: Vec<CellFace>,
 }
-
-/// Sine and cosine of an angle.
-type Turn = (f64, f64);
 
 /// A face between two cells: its block, its unknowns, and its frame.
 #[derive(Debug, Clone)]
@@ -264,8 +261,8 @@ impl<'p> CondensedWheels<'p> {
         self.kernels.multiply_add(&cell.stiffness, one(&quarter), 1.0, one_mut(&mut turned));
         let (g, c) = cell.frame.geometric(state, &self.forces[j], &turned);
         let place = CellPlacement {
-            frame: mesh.sector_angle(j) + state.turn,
-            faces: [state.turn + 0.5 * mesh.pitch(), state.turn - 0.5 * mesh.pitch()],
+            frame: (mesh.sector_angle(j) + state.turn).sin_cos(),
+            faces: [0.5, -0.5].map(|half| (state.turn + half * mesh.pitch()).sin_cos()),
             blocks: [j as u32, ((j + 1) % mesh.teeth) as u32],
         };
         let geometric = Geometric { a: &state.turn_rate, g: &g, c };
@@ -326,8 +323,8 @@ impl<'p> CondensedWheels<'p> {
     ) -> Option<Contribution> {
         let (first, mesh) = (self.model.fs_mesh().teeth, self.model.cs_mesh());
         let place = CellPlacement {
-            frame: cs_frame(mesh, t),
-            faces: [0.5 * mesh.pitch(), -0.5 * mesh.pitch()],
+            frame: cs_frame(mesh, t).sin_cos(),
+            faces: [0.5, -0.5].map(|half| (half * mesh.pitch()).sin_cos()),
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
         };
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);

@@ -95,18 +95,12 @@ pub struct SolverSettings {
 impl SolverSettings {
     /// Penalty on the bore for a generator, N/mm³.
     pub fn bore_penalty(&self, kind: GeneratorKind) -> f64 {
-        self.bore_penalty.unwrap_or(match kind {
-            GeneratorKind::TwoRoller | GeneratorKind::FourRoller => 1e7,
-            GeneratorKind::DoubleDisc | GeneratorKind::Cam => 1e6,
-        })
+        self.bore_penalty.unwrap_or(if kind.has_rollers() { 1e7 } else { 1e6 })
     }
 
     /// Integration points in each bore edge for a generator.
     pub fn bore_points(&self, kind: GeneratorKind) -> usize {
-        self.bore_points.unwrap_or(match kind {
-            GeneratorKind::TwoRoller | GeneratorKind::FourRoller => 48,
-            GeneratorKind::DoubleDisc | GeneratorKind::Cam => 8,
-        })
+        self.bore_points.unwrap_or(if kind.has_rollers() { 48 } else { 8 })
     }
 }
 
