@@ -627,7 +627,7 @@ mod tests {
                 first_node += mesh.map_or(0, |mesh| mesh.nodes.len());
             }
             for equation in &deck.equations {
-                used.extend(equation.terms.iter().map(|term| term.node));
+                used.extend(equation.iter().map(|term| term.node));
             }
             assert_eq!(used.len(), nodes.len(), "{kind}: a node that nothing uses");
             assert_eq!(used.last(), Some(&nodes.len()));
@@ -685,8 +685,8 @@ mod tests {
     fn a_unit_of_output_turns_the_outer_circle() {
         let deck = Deck::new(&problem(&drive(), GeneratorKind::Cam), SETTINGS).unwrap();
         let mut turned = 0;
-        for equation in deck.equations.iter().filter(|equation| deck.outer.contains(&equation.terms[0].node)) {
-            let [first, angle, seat] = equation.terms[..] else { panic!("{equation:?}") };
+        for equation in deck.equations.iter().filter(|equation| deck.outer.contains(&equation[0].node)) {
+            let [first, angle, seat] = equation[..] else { panic!("{equation:?}") };
             let [x, y] = deck.nodes[first.node - 1];
             let r = x.hypot(y);
             let expected = if first.dof == 1 { (-y, x / r) } else { (x, y / r) };

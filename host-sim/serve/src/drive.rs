@@ -9,7 +9,9 @@ use serde::Serialize;
 use crate::folder::{Folder, FolderError};
 use crate::work::DriveAsked;
 use flexspline_export::outlines;
-use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, GeneratorOutline, ListedField, Problem, RigidMesh};
+use flexspline_mechanics::drive::{
+    Drive, DriveError, GeneratorKind, GeneratorOutline, ListedField, Problem, RigidMesh,
+};
 
 /// Bytes of a drive file, at most: those with an error for each of 2000 teeth have 50 kB.
 const LARGEST_DRIVE: u64 = 1 << 20;

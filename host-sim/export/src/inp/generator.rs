@@ -186,7 +186,8 @@ mod tests {
             for psi in [0.0, 0.3] {
                 let nodes = body.at(psi);
                 for element in &body.elements {
-                    let [a, m, b] = [element[1], element[5], element[2]].map(|n| rotate(nodes[n as usize], f64::sin_cos(-psi)));
+                    let [a, m, b] =
+                        [element[1], element[5], element[2]].map(|n| rotate(nodes[n as usize], f64::sin_cos(-psi)));
                     // Where the discs cross there is a corner that no bore touches.
                     if kind == GeneratorKind::DoubleDisc && a[0].abs().min(b[0].abs()) < 1.0 {
                         continue;

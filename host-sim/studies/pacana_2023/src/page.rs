@@ -10,8 +10,8 @@ use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::animation::{Animation, AnimationError};
 use flexspline_report::drive_figures::{drive_figure, less_mean, sleeve_figure};
 use flexspline_report::page::{
-    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
-    Status, significant,
+    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
+    RichText, Status, significant,
 };
 
 /// The page; `animations` are the drives in motion, without load.
