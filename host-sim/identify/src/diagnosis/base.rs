@@ -226,7 +226,10 @@ impl Base {
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         // No output is on its other flank at once.
         if rows.recorded.time {
-            let [fast, slow] = FLANKS_S.map(|lag_s| behind(rows, &flank, half_backlash, lag_s));
+            let [fast, slow] = FLANKS_S.map(|lag_s| {
+                let reached = rows.lagged(&flank, lag_s, false).into_iter().zip(&flank);
+                reached.map(|(reached, flank)| half_backlash * (reached - flank)).collect::<Vec<f64>>()
+            });
             let per_s: Vec<f64> = fast.into_iter().map(|arcsec| arcsec / FLANKS_S[0]).collect();
             let slower = slow.into_iter().zip(&per_s).map(|(slow, per_s)| slow - FLANKS_S[1] * per_s);
             add(SLOW_CHANGE_OF_FLANK, slower.collect(), 1.0);
@@ -280,20 +283,6 @@ impl Base {
         }
         self.flank = flank;
     }
-}
-
-/// What the error lacks as the output follows a change of flank with a lag, arcsec.
-fn behind(rows: &Rows, flank: &[f64], half_backlash: f64, lag_s: f64) -> Vec<f64> {
-    let mut behind = vec![0.0; rows.len()];
-    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
-        let mut reached = flank[session.start];
-        for k in session.start + 1..session.end {
-            let passed = (rows.time[k] - rows.time[k - 1]).max(0.0);
-            reached += (flank[k] - reached) * (1.0 - (-passed / lag_s).exp());
-            behind[k] = half_backlash * (reached - flank[k]);
-        }
-    }
-    behind
 }
 
 /// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong
