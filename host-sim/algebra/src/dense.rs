@@ -11,6 +11,7 @@ pub type Mat = faer::Mat<f64>;
 pub type MatRef<'a> = faer::MatRef<'a, f64>;
 
 /// `A = L Lᵀ` of a symmetric positive definite matrix.
+#[derive(Clone, Debug)]
 pub struct CholeskyFactor(Llt<f64>);
 
 /// Factor of a symmetric matrix, of which the lower triangle is read.
@@ -26,6 +27,12 @@ impl CholeskyFactor {
     #[must_use]
     pub fn solve(&self, right_hand_sides: MatRef<'_>) -> Mat {
         self.0.solve(right_hand_sides)
+    }
+
+    /// `ln |A|`.
+    #[must_use]
+    pub fn log_determinant(&self) -> f64 {
+        self.0.L().diagonal().column_vector().iter().map(|pivot| 2.0 * pivot.ln()).sum()
     }
 
     /// `A⁻¹`.

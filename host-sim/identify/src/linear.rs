@@ -6,6 +6,7 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
+use flexspline_algebra::{CholeskyFactor, Mat, cholesky};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::least_squares::dot;
@@ -215,12 +216,10 @@ pub(crate) struct Solution {
     pub coefficients: Vec<f64>,
     /// Penalised misfit J.
     pub misfit: f64,
-    /// Squared residual without the penalty.
-    pub residual: f64,
     /// Logarithm of the evidence.
     pub evidence: f64,
-    /// Cholesky factor of `A` in units of the priors, lower triangle, row by row.
-    factor: Vec<f64>,
+    /// Factor of `A` in units of the priors.
+    factor: CholeskyFactor,
     /// Standard deviations of the priors.
     scale: Vec<f64>,
 }
@@ -229,55 +228,10 @@ impl Solution {
     /// Covariance of the coefficients, row by row.
     #[must_use]
     pub(crate) fn covariance(&self) -> Vec<f64> {
-        let n = self.scale.len();
-        let mut covariance = vec![0.0; n * n];
-        let mut unit = vec![0.0; n];
-        for j in 0..n {
-            unit.fill(0.0);
-            unit[j] = 1.0;
-            forward(&self.factor, &mut unit);
-            backward(&self.factor, &mut unit);
-            for i in 0..n {
-                covariance[i * n + j] = unit[i] * self.scale[i] * self.scale[j];
-            }
-        }
-        covariance
+        let (inverse, scale) = (self.factor.inverse(), &self.scale);
+        let row = |i: usize| (0..scale.len()).map(move |j| (i, j));
+        (0..scale.len()).flat_map(row).map(|(i, j)| inverse[(i, j)] * scale[i] * scale[j]).collect()
     }
-}
-
-/// Solves `L x = b` in place.
-fn forward(l: &[f64], x: &mut [f64]) {
-    let n = x.len();
-    for i in 0..n {
-        let sum: f64 = (0..i).map(|k| l[i * n + k] * x[k]).sum();
-        x[i] = (x[i] - sum) / l[i * n + i];
-    }
-}
-
-/// Solves `Lᵀ x = b` in place.
-fn backward(l: &[f64], x: &mut [f64]) {
-    let n = x.len();
-    for i in (0..n).rev() {
-        let sum: f64 = (i + 1..n).map(|k| l[k * n + i] * x[k]).sum();
-        x[i] = (x[i] - sum) / l[i * n + i];
-    }
-}
-
-/// Cholesky factor, row by row; none if the matrix is not positive definite or not finite.
-fn factor(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
-    for i in 0..n {
-        let (above, row) = a.split_at_mut(i * n);
-        for j in 0..i {
-            let known = &above[j * n..=j * n + j];
-            row[j] = (row[j] - dot(&known[..j], &row[..j])) / known[j];
-        }
-        let pivot = row[i] - dot(&row[..i], &row[..i]);
-        if pivot <= 0.0 || !pivot.is_finite() {
-            return None;
-        }
-        row[i] = pivot.sqrt();
-    }
-    Some(a)
 }
 
 /// Solves with priors. `worth` scales all information in the data: below 1 where the noise is not as white as it was
@@ -291,35 +245,18 @@ pub(crate) fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solutio
     // In units of the prior: diagonal at least 1, well scaled whatever the columns are.
     let s: Vec<f64> = priors.iter().map(|p| p.std.max(1e-12)).collect();
     let shift: Vec<f64> = priors.iter().map(|p| p.mean).collect();
-    let mut a = vec![0.0; n * n];
-    let mut b = vec![0.0; n];
-    let mut power = gram.at(n, n);
-    for i in 0..n {
-        let across: f64 = (0..n).map(|j| gram.at(i, j) * shift[j]).sum();
-        power += shift[i] * (across - 2.0 * gram.at(i, n));
-        b[i] = worth * s[i] * (gram.at(i, n) - across);
-        for j in 0..n {
-            a[i * n + j] = worth * s[i] * s[j] * gram.at(i, j);
-        }
-        a[i * n + i] += 1.0;
-    }
-    let l = factor(a, n)?;
-    let log_det = 2.0 * (0..n).map(|i| l[i * n + i].ln()).sum::<f64>();
-    let mut z = b;
-    forward(&l, &mut z);
-    let explained: f64 = z.iter().map(|v| v * v).sum();
-    backward(&l, &mut z);
-    let coefficients: Vec<f64> = (0..n).map(|i| shift[i] + s[i] * z[i]).collect();
-    let misfit = worth * power - explained;
-    let penalty: f64 = z.iter().map(|v| v * v).sum();
-    Some(Solution {
-        coefficients,
-        misfit,
-        residual: misfit - penalty,
-        evidence: -0.5 * misfit - 0.5 * log_det,
-        factor: l,
-        scale: s,
-    })
+    let across: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram.at(i, j) * shift[j]).sum()).collect();
+    let shifted: f64 = (0..n).map(|i| shift[i] * (across[i] - 2.0 * gram.at(i, n))).sum();
+    let one = |i: usize, j: usize| f64::from(u8::from(i == j));
+    let a = Mat::from_fn(n, n, |i, j| worth * s[i] * s[j] * gram.at(i, j) + one(i, j));
+    let b = Mat::from_fn(n, 1, |i, _| worth * s[i] * (gram.at(i, n) - across[i]));
+    let factor = cholesky(a.as_ref()).ok()?;
+    let z = factor.solve(b.as_ref());
+    let explained: f64 = (0..n).map(|i| b[(i, 0)] * z[(i, 0)]).sum();
+    let coefficients = (0..n).map(|i| shift[i] + s[i] * z[(i, 0)]).collect();
+    let misfit = worth * (gram.at(n, n) + shifted) - explained;
+    let evidence = -0.5 * misfit - 0.5 * factor.log_determinant();
+    evidence.is_finite().then_some(Solution { coefficients, misfit, evidence, factor, scale: s })
 }
 
 #[cfg(test)]

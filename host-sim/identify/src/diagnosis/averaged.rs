@@ -27,8 +27,8 @@ pub(crate) struct Averaged {
     pub stride: usize,
     /// Rows in each average.
     counts: Vec<f64>,
-    /// First row and first average of each session.
-    firsts: Vec<(usize, usize)>,
+    /// First row of each average.
+    firsts: Vec<usize>,
 }
 
 impl Averaged {
@@ -40,11 +40,10 @@ impl Averaged {
             return None;
         }
         let from = on.rows;
-        let (mut groups, mut sessions, mut firsts) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut groups, mut sessions) = (Vec::new(), Vec::new());
         for session in &from.sessions {
             let first = groups.len();
             groups.extend(parts(session, stride));
-            firsts.push((session.start, first));
             sessions.push(first..groups.len());
         }
         let turned = groups.iter().map(|g| (from.generator[g.end - 1] - from.generator[g.start]).abs());
@@ -55,18 +54,15 @@ impl Averaged {
         let rows = Rows { period: from.period * stride as f64, ..from.each(sessions, mean) };
         let base = on.base.each(mean);
         let counts = groups.iter().map(|group| group.len() as f64).collect();
+        let firsts = groups.iter().map(|group| group.start).collect();
         Some(Averaged { rows, base, stride, counts, firsts })
     }
 
     /// The averages that each group of rows consists of. Groups hold whole averages.
     #[must_use]
     pub(crate) fn in_groups(&self, groups: &[Range<usize>]) -> Vec<Range<usize>> {
-        let of = |group: &Range<usize>| {
-            let session = self.firsts.partition_point(|(first, _)| *first <= group.start) - 1;
-            let (row, average) = self.firsts[session];
-            average + (group.start - row) / self.stride..average + (group.end - row).div_ceil(self.stride)
-        };
-        groups.iter().map(of).collect()
+        let from = |row: usize| self.firsts.partition_point(|first| *first < row);
+        groups.iter().map(|group| from(group.start)..from(group.end)).collect()
     }
 
     /// Means of a column of averages over groups of them.

@@ -145,11 +145,13 @@ pub(crate) struct Base {
 
 /// The parameter that floats where angles are read at other instants than is known, s.
 pub const BETWEEN_READINGS: &str = "time between the readings";
-/// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as
-/// this time says, to first order about [`FLANK_S`].
+/// What floats as the output takes a time to go to its other flank, s: its lag.
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
-/// The output goes from one flank to the other in some milliseconds. *Guess*.
-pub(super) const FLANK_S: f64 = 5e-3;
+/// How much the longer of [`FLANKS_S`] has of that.
+const SLOW_CHANGE_OF_FLANK: &str = "slow share of a change of flank";
+/// A lag of a change of flank is the sum of these two, s. *Chosen*: at 500 rows a second any of 2 to 20 ms comes out
+/// within a fifth. A load behind a clearance takes some milliseconds, and what takes longer swings.
+const FLANKS_S: [f64; 2] = [3e-3, 20e-3];
 /// Prior standard deviation of what no drawing fixes, arcsec: the offset of the output encoder. *Guess*: 2.8°, so wide
 /// that the data alone decide.
 pub(super) const FREE: f64 = 1e4;
@@ -165,11 +167,11 @@ const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction. *Guess*: friction of a unit is known to a
 /// quarter.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
-/// A clearance is crossed within this time, s. *Guess*: many times the 5 ms of [`FLANK_S`].
+/// A clearance is crossed within this time, s. *Guess*: four times the longest of [`FLANKS_S`].
 const CROSSING_S: f64 = 0.08;
 /// A clearance may be this many times as wide as the nominal one before anything else is known. *Guess*: wear and
 /// tolerances rarely add more than half.
-pub(super) const WIDER: f64 = 1.6;
+const WIDER: f64 = 1.6;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about. *Guess*: two
 /// thirds of the rows are enough to fit.
 const UNCERTAIN_AT_MOST: f64 = 0.35;
@@ -224,8 +226,14 @@ impl Base {
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         // No output is on its other flank at once.
         if rows.recorded.time {
-            let per_s = behind(rows, &flank, half_backlash).into_iter().map(|arcsec| arcsec / FLANK_S);
-            add(CHANGE_OF_FLANK, per_s.collect(), FLANK_S);
+            let [fast, slow] = FLANKS_S.map(|lag_s| {
+                let reached = rows.lagged(&flank, lag_s, false).into_iter().zip(&flank);
+                reached.map(|(reached, flank)| half_backlash * (reached - flank)).collect::<Vec<f64>>()
+            });
+            let per_s: Vec<f64> = fast.into_iter().map(|arcsec| arcsec / FLANKS_S[0]).collect();
+            let slower = slow.into_iter().zip(&per_s).map(|(slow, per_s)| slow - FLANKS_S[1] * per_s);
+            add(SLOW_CHANGE_OF_FLANK, slower.collect(), 1.0);
+            add(CHANGE_OF_FLANK, per_s, FLANKS_S[1]);
         }
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
@@ -275,20 +283,6 @@ impl Base {
         }
         self.flank = flank;
     }
-}
-
-/// What the error lacks as the output follows a change of flank with a lag of [`FLANK_S`], arcsec.
-fn behind(rows: &Rows, flank: &[f64], half_backlash: f64) -> Vec<f64> {
-    let mut behind = vec![0.0; rows.len()];
-    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
-        let mut reached = flank[session.start];
-        for k in session.start + 1..session.end {
-            let passed = (rows.time[k] - rows.time[k - 1]).max(0.0);
-            reached += (flank[k] - reached) * (1.0 - (-passed / FLANK_S).exp());
-            behind[k] = half_backlash * (reached - flank[k]);
-        }
-    }
-    behind
 }
 
 /// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong

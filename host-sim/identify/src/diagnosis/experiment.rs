@@ -159,16 +159,14 @@ fn least_apart(
         .map(|(k, at)| {
             let states: Vec<RunState> = (0..ROWS).map(|row| at(row as f64 / ROWS as f64)).collect();
             let column = |of: usize, value: &dyn Fn(f64) -> f64| states.iter().map(|state| value(state[of])).collect();
-            Session {
-                line: (0..ROWS as u64).collect(),
-                time_s: Some((0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect()),
-                generator_rad: column(0, &|turns| TAU * turns * on.nominal.ratio.abs() / 95.0),
-                error_rad: vec![0.0; ROWS],
-                torque_n_m: Some(column(1, &|torque| torque * on.scales.load)),
-                temperature_c: Some(column(2, &|warmer| on.nominal.temperature_c + warmer)),
-                orientation_rad: Some(column(3, &|orientation| orientation)),
-                ..Session::default()
-            }
+            let time_s = (0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect();
+            let generator_rad = column(0, &|turns| TAU * turns * on.nominal.ratio.abs() / 95.0);
+            let others = [
+                column(1, &|torque| torque * on.scales.load),
+                column(2, &|warmer| on.nominal.temperature_c + warmer),
+                column(3, &|orientation| orientation),
+            ];
+            Session::imagined(time_s, generator_rad, others)
         })
         .collect();
     let mut rows = Rows::new(&sessions, on.nominal);

@@ -6,7 +6,7 @@ use super::candidate::{Excitation, Law, Tolerance};
 use super::noise::Whitener;
 use super::rows::{Rows, combined, rms, robust_std};
 use crate::causes::CauseName;
-use crate::linear::{Gram, Prior, solve};
+use crate::least_squares::Normal;
 
 /// Rows whose mean is taken from each of them, to see what is fast. *Guess*: what passes within a few rows is fast.
 const TOGETHER: usize = 5;
@@ -91,16 +91,15 @@ fn explained_in_detail(rows: &Rows, columns: &[Vec<f64>], left: &[f64], uncertai
         return None;
     }
     let data = counted(data);
-    let views: Vec<&[f64]> = details.iter().chain([&data]).map(Vec::as_slice).collect();
-    let gram = Gram::of(&views, 0..data.len());
-    let free: Vec<Prior> = columns.iter().map(|c| Prior { mean: 0.0, std: 1e3 * spread / rms(c).max(1e-12) }).collect();
-    let solution = solve(&gram, &free, 1.0)?;
-    let before = gram.at(columns.len(), columns.len());
+    let fit = Normal::of(columns.len(), data.len(), |k, row| {
+        row.iter_mut().zip(&details).for_each(|(cell, fine)| *cell = fine[k]);
+        (data[k], 1.0)
+    })?;
     // Schwarz: what the fit gains in likelihood, less the gain of that number of free columns from noise.
     let n = used as f64;
-    let evidence = 0.5 * n * (before / solution.residual.max(1e-300)).ln() - 0.5 * columns.len() as f64 * n.ln();
+    let evidence = 0.5 * n * (fit.square / fit.misfit().max(1e-300)).ln() - 0.5 * columns.len() as f64 * n.ln();
     if evidence < LEAST_EVIDENCE {
         return None;
     }
-    Some(combined(left.len(), columns.iter().map(Vec::as_slice), &solution.coefficients))
+    Some(combined(left.len(), columns.iter().map(Vec::as_slice), &fit.values()))
 }

@@ -256,6 +256,31 @@ impl Rows {
         self.generator.is_empty()
     }
 
+    /// Values of the rows after a first-order lag of `lag_s`. Each session begins with its first value; where the lag
+    /// `goes_on`, with the state that the session before had reached, nearer to that value by the time between them.
+    pub(super) fn lagged(&self, values: &[f64], lag_s: f64, goes_on: bool) -> Vec<f64> {
+        let mut reached = vec![0.0; self.len()];
+        let mut last: Option<usize> = None;
+        for session in &self.sessions {
+            let first = values[session.start];
+            let gap_s = |last: usize| self.time[session.start] - self.time[last];
+            // Where clocks begin anew nobody knows how long it had.
+            let mut state = match last.filter(|last| goes_on && gap_s(*last) >= 0.0) {
+                Some(last) => first + (reached[last] - first) * (-gap_s(last) / lag_s).exp(),
+                None => first,
+            };
+            for k in session.clone() {
+                if k > session.start {
+                    let dt = (self.time[k] - self.time[k - 1]).max(0.0);
+                    state += (values[k] - state) * (1.0 - (-dt / lag_s).exp());
+                }
+                reached[k] = state;
+            }
+            last = session.clone().last();
+        }
+        reached
+    }
+
     /// Noise of all rows together, root mean square, against that of a row of mean worth.
     #[must_use]
     pub(crate) fn loudness_rms(&self) -> f64 {

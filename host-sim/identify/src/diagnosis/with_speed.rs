@@ -3,15 +3,17 @@
 //! comes to that of the load on its spring. Less of it in fast motion speaks against no encoder: a reading that is
 //! averaged, or whose instant scatters, smears its lines.
 
+use std::ops::Range;
+
 use super::candidate::{Label, Per};
 use super::channels::BLOCKS;
 use super::model::Problem;
 use super::remainder::explained;
-use super::rows::{quantile, robust_std};
+use super::rows::quantile;
 use super::select::Selected;
 use super::uncertainty::Known;
 use crate::causes::{CauseName, ParameterName};
-use crate::least_squares::Normal;
+use crate::least_squares::{Normal, jackknife};
 
 /// Slow rows are this share of those in motion, … *Guess*: the slowest third.
 const SLOW: f64 = 0.35;
@@ -118,35 +120,25 @@ pub(super) fn with_speed(
 }
 
 /// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares, the mean free.
-/// The deviation is that of white noise, or that by blocks of neighbouring rows (a sandwich), whichever is larger:
-/// wander and other lines are alike from row to row.
+/// The deviation is that of blocks of neighbouring rows left out in turn: wander and other lines are alike from row to
+/// row.
 fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
-    let count = rows.len() as f64;
     let wave = |k: &usize| [1.0, angle(*k).cos(), angle(*k).sin(), value(*k)];
     let waves: Vec<[f64; 4]> = rows.iter().map(wave).collect();
-    let put = |k: usize, row: &mut [f64]| {
-        row.copy_from_slice(&waves[k][..3]);
-        (waves[k][3], 1.0)
+    let (count, block) = (waves.len(), waves.len().div_ceil(BLOCKS));
+    let without = |out: Range<usize>| {
+        let fit = Normal::of(3, count, |k, row| {
+            row.copy_from_slice(&waves[k][..3]);
+            (waves[k][3], f64::from(u8::from(!out.contains(&k))))
+        })?;
+        let [_, cosine, sine] = fit.values()[..] else { return None };
+        // Rows that see too little of the wave do not tell its two parts.
+        let inverse = &fit.inverse;
+        let doubt = inverse[(1, 1)] * inverse[(2, 2)] - inverse[(1, 2)].powi(2);
+        (doubt * (count as f64).powi(2) <= 4e2).then(|| cosine.hypot(sine))
     };
-    let fit = Normal::of(3, waves.len(), put)?.sound(waves.len())?;
-    let [mean, cosine, sine] = fit.values()[..] else { return None };
-    let inverse = &fit.inverse;
-    // Rows that see too little of the wave to tell its two parts.
-    if inverse[(1, 1)] * inverse[(2, 2)] - inverse[(1, 2)].powi(2) > 4e2 / (count * count) {
-        return None;
-    }
-    let amplitude = cosine.hypot(sine);
-    let left = |wave: &[f64; 4]| wave[3] - mean - cosine * wave[1] - sine * wave[2];
-    let white = robust_std(waves.iter().map(left)) * (2.0 / count).sqrt();
-    // Contribution of a block to the amplitude found.
-    let added = |block: &[[f64; 4]]| -> f64 {
-        let scores = [0, 1, 2].map(|of: usize| block.iter().map(|wave| wave[of] * left(wave)).sum::<f64>());
-        let [c, s] = [1, 2].map(|a: usize| (0..3).map(|b: usize| inverse[(a, b)] * scores[b]).sum::<f64>());
-        (c * cosine + s * sine) / amplitude.max(1e-30)
-    };
-    let blocks = waves.chunks(waves.len().div_ceil(BLOCKS));
-    let by_blocks = blocks.map(|block| added(block).powi(2)).sum::<f64>().sqrt();
-    Some((amplitude, white.max(by_blocks)))
+    let others: Option<Vec<f64>> = (0..count).step_by(block).map(|from| without(from..from + block)).collect();
+    Some((without(0..0)?, jackknife(&others?)))
 }
 
 /// Sentences on spectral lines of the generator angle, with their names: of terms of a model, and of lines that

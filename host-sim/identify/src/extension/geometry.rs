@@ -87,16 +87,9 @@ impl Probe {
     ) -> Probe {
         let session = |load: f64| {
             let n = generator.len();
-            Session {
-                line: (0..n as u64).collect(),
-                time_s: Some((0..n).map(|k| 1e4 * k as f64).collect()),
-                generator_rad: generator.clone(),
-                error_rad: vec![0.0; n],
-                torque_n_m: Some(vec![load; n]),
-                temperature_c: Some(vec![nominal.temperature_c; n]),
-                orientation_rad: Some(vec![orientation_rad; n]),
-                ..Session::default()
-            }
+            let time_s = (0..n).map(|k| 1e4 * k as f64).collect();
+            let others = [load, nominal.temperature_c, orientation_rad].map(|value| vec![value; n]);
+            Session::imagined(time_s, generator.clone(), others)
         };
         let load = PROBE_N_M.max(1.5 * nominal.friction_torque_n_m);
         let [plus, minus] =

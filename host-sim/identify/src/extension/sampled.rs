@@ -257,17 +257,11 @@ impl ExtendedTables<'_> {
     fn steady(&self, turn: f64, positions: usize, torque: f64, temperature: f64, number: usize) -> Session {
         let step = turn * TAU * self.nominal.ratio.abs() / positions as f64;
         let rows = BEFORE + positions;
-        Session {
-            line: (0..rows as u64).collect(),
-            // So slow that nothing of it depends on speed.
-            time_s: Some((0..rows).map(|k| 1e4 * (k + 2 * rows * number) as f64).collect()),
-            generator_rad: (0..rows).map(|k| (k as f64 - BEFORE as f64) * step).collect(),
-            error_rad: vec![0.0; rows],
-            torque_n_m: Some(vec![torque; rows]),
-            temperature_c: Some(vec![temperature; rows]),
-            orientation_rad: Some(vec![self.orientation_rad.unwrap_or(0.0); rows]),
-            ..Session::default()
-        }
+        // So slow that nothing of it depends on speed.
+        let time_s = (0..rows).map(|k| 1e4 * (k + 2 * rows * number) as f64).collect();
+        let generator_rad = (0..rows).map(|k| (k as f64 - BEFORE as f64) * step).collect();
+        let others = [torque, temperature, self.orientation_rad.unwrap_or(0.0)].map(|value| vec![value; rows]);
+        Session::imagined(time_s, generator_rad, others)
     }
 }
 

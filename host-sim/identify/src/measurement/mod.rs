@@ -79,6 +79,22 @@ pub struct Session {
 }
 
 impl Session {
+    /// Rows that nobody has measured, without an error: their instants, angles of the generator, and torques,
+    /// temperatures and orientations.
+    pub(crate) fn imagined(time_s: Vec<f64>, generator_rad: Vec<f64>, others: [Vec<f64>; 3]) -> Session {
+        let [torque_n_m, temperature_c, orientation_rad] = others.map(Some);
+        Session {
+            line: (2..).take(time_s.len()).collect(),
+            error_rad: vec![0.0; time_s.len()],
+            time_s: Some(time_s),
+            generator_rad,
+            torque_n_m,
+            temperature_c,
+            orientation_rad,
+            ..Session::default()
+        }
+    }
+
     /// Rows.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -6,10 +6,11 @@
 //! begin anew with [`begins_anew`]; [`unwrap`] makes the angles of a log continuous.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use super::columns::{MappedColumn, Quantity, Unit};
-use super::faults::LineFit;
 use super::log::Log;
+use crate::least_squares::Normal;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of};
 
 /// Bits of registers.
@@ -148,8 +149,8 @@ impl MeasuredSpan {
             let from = if k > 0 { leaps[k - 1] } else { 0 }.max(at.saturating_sub(ROWS_AROUND));
             let to = leaps.get(k + 1).copied().unwrap_or(rows.len()).min(at + ROWS_AROUND);
             let y = |k: usize| values[rows[k]];
-            let by_row = Leap::between(from..*at, *at..to, |k| k as f64, y, rounded);
-            let by_other = along.and_then(|other| Leap::between(from..*at, *at..to, |k| other[rows[k]], y, rounded));
+            let by_row = Leap::into(*at, from..to, |k| k as f64, y, rounded);
+            let by_other = along.and_then(|other| Leap::into(*at, from..to, |k| other[rows[k]], y, rounded));
             // A noisy angle flattens the slope: it is asked only if it is clearly the better one.
             let best = match (by_row, by_other) {
                 (Some(row), Some(other)) if other.std < 0.7 * row.std => Some(other),
@@ -206,39 +207,29 @@ struct Leap {
 }
 
 impl Leap {
-    /// Fits `y` by one slope in `x` and a step between the rows `before` and `after`.
-    fn between(
-        before: std::ops::Range<usize>,
-        after: std::ops::Range<usize>,
+    /// Fits `y` by one slope in `x` and a step into the row `at`, over the rows `around` it.
+    fn into(
+        at: usize,
+        around: Range<usize>,
         x: impl Fn(usize) -> f64,
         y: impl Fn(usize) -> f64,
         rounded: f64,
     ) -> Option<Leap> {
-        let sides = [before.clone(), after.clone()];
-        let [n, m] = sides.each_ref().map(|rows| rows.len() as f64);
-        if n.min(m) < 1.0 || n + m < 4.0 {
+        let count = around.len();
+        if at == around.start || count < 4 {
             return None;
         }
-        let mean = |of: &dyn Fn(usize) -> f64| {
-            sides.each_ref().map(|rows| rows.clone().map(of).sum::<f64>() / rows.len() as f64)
-        };
-        let (mx, my) = (mean(&x), mean(&y));
-        let about = |k: usize| {
-            let side = usize::from(k >= after.start);
-            (x(k) - mx[side], y(k) - my[side])
-        };
-        let about: Vec<(f64, f64)> = sides.into_iter().flatten().map(about).collect();
-        let LineFit { slope, square: xx, residual } = LineFit::of(&about);
-        if !(xx > 0.0 && xx.is_finite() && slope.is_finite()) {
-            return None;
-        }
-        let squares: f64 = residual.iter().map(|off| off * off).sum();
-        let variance = (squares / (n + m - 3.0)).max(rounded * rounded);
-        let step = (my[1] - my[0]) - slope * (mx[1] - mx[0]);
-        let std = (variance * (1.0 / n + 1.0 / m + (mx[1] - mx[0]).powi(2) / xx)).sqrt();
-        let (last, first) = (before.end - 1, after.start);
-        let moved = slope * (x(first) - x(last));
-        Some(Leap { size: step.abs(), std, border: y(last) + 0.5 * moved, step: moved, against: step * slope < 0.0 })
+        let fit = Normal::of(3, count, |k, row| {
+            let k = around.start + k;
+            row.copy_from_slice(&[1.0, f64::from(u8::from(k >= at)), x(k) - x(at)]);
+            (y(k) - y(at), 1.0)
+        })?;
+        let [_, step, slope] = fit.values()[..] else { return None };
+        let variance = (fit.misfit() / (count as f64 - 3.0)).max(rounded * rounded);
+        let (std, moved) = ((variance * fit.inverse[(1, 1)]).sqrt(), slope * (x(at) - x(at - 1)));
+        let leap =
+            Leap { size: step.abs(), std, border: y(at - 1) + 0.5 * moved, step: moved, against: step * slope < 0.0 };
+        (std.is_finite() && slope.is_finite()).then_some(leap)
     }
 }
 

@@ -29,20 +29,16 @@ pub fn completed(sessions: &[Session], rate_hz: f64, temperature_c: f64) -> Vec<
     moving
         .map(|session| {
             let n = session.len();
-            let or = |column: &Option<Vec<f64>>, usual: f64| Some(column.clone().unwrap_or_else(|| vec![usual; n]));
+            let or = |column: &Option<Vec<f64>>, usual: f64| column.clone().unwrap_or_else(|| vec![usual; n]);
             let counted = || (0..n).map(|k| begin + k as f64 / rate_hz).collect();
             let time: Vec<f64> = session.time_s.clone().unwrap_or_else(counted);
             begin = time.last().map_or(0.0, |last| last + 100.0 / rate_hz);
-            Session {
-                line: (2..n as u64 + 2).collect(),
-                time_s: Some(time),
-                generator_rad: session.generator_rad.clone(),
-                error_rad: vec![0.0; n],
-                torque_n_m: or(&session.torque_n_m, 0.0),
-                temperature_c: or(&session.temperature_c, temperature_c),
-                orientation_rad: or(&session.orientation_rad, 0.0),
-                ..Session::default()
-            }
+            let others = [
+                or(&session.torque_n_m, 0.0),
+                or(&session.temperature_c, temperature_c),
+                or(&session.orientation_rad, 0.0),
+            ];
+            Session::imagined(time, session.generator_rad.clone(), others)
         })
         .collect()
 }
@@ -105,16 +101,8 @@ impl MotionPlan {
                 temperature.push(start + drift * (t / (self.rows as f64 * dt)));
             }
             clock += self.rows as f64 * dt + 300.0 + 3000.0 * random.f64();
-            sessions.push(Session {
-                line: (2..self.rows as u64 + 2).collect(),
-                time_s: Some(time),
-                generator_rad: generator,
-                error_rad: vec![0.0; self.rows],
-                torque_n_m: Some(torques),
-                temperature_c: Some(temperature),
-                orientation_rad: Some(vec![orientation; self.rows]),
-                ..Session::default()
-            });
+            let orientations = vec![orientation; self.rows];
+            sessions.push(Session::imagined(time, generator, [torques, temperature, orientations]));
         }
         sessions
     }

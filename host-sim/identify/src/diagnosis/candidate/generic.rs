@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::geometry::{Angle, waves};
 use super::stiffness::follow;
-use super::{Excitation, Label, Law, Per, Shape, Tag, by_row, lagged, main, times};
+use super::{Excitation, Label, Law, Per, Shape, Tag, by_row, main, times};
 use crate::causes::ParameterName as Name;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -60,7 +60,7 @@ fn coupling_before_the_generator() -> Law {
 fn creep_under_load() -> Law {
     Law::new("creep under load", |on, _| {
         let late = |lasts_s: f64| {
-            let reached = lagged(on, &on.base.wind_up, lasts_s, false);
+            let reached = on.rows.lagged(&on.base.wind_up, lasts_s, false);
             main(by_row(on, |k| reached[k] - on.base.wind_up[k]), 0.3)
         };
         [1.0, 10.0, 100.0, 1000.0].into_iter().map(late).collect()

@@ -699,32 +699,6 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     CauseName::ALL.iter().filter(|cause| on.speaks_of(**cause)).flat_map(|cause| (cause.spec().laws)(on)).collect()
 }
 
-/// The values after a first-order lag of `lag_s`. Each session begins with its first value; where the lag `goes_on`,
-/// with the state that the session before had reached, nearer to that value by the time between them.
-fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64, goes_on: bool) -> Vec<f64> {
-    let rows = on.rows;
-    let mut reached = vec![0.0; rows.len()];
-    let mut last: Option<usize> = None;
-    for session in &rows.sessions {
-        let first = values[session.start];
-        let gap_s = |last: usize| rows.time[session.start] - rows.time[last];
-        // Where clocks begin anew nobody knows how long it had.
-        let mut state = match last.filter(|last| goes_on && gap_s(*last) >= 0.0) {
-            Some(last) => first + (reached[last] - first) * (-gap_s(last) / lag_s).exp(),
-            None => first,
-        };
-        for k in session.clone() {
-            if k > session.start {
-                let dt = (rows.time[k] - rows.time[k - 1]).max(0.0);
-                state += (values[k] - state) * (1.0 - (-dt / lag_s).exp());
-            }
-            reached[k] = state;
-        }
-        last = session.clone().last();
-    }
-    reached
-}
-
 /// A column made row by row.
 fn by_row(on: &Excitation<'_>, value: impl Fn(usize) -> f64) -> Vec<f64> {
     (0..on.rows.len()).map(value).collect()

@@ -1,7 +1,7 @@
 //! Causes that follow the temperature.
 
 use super::dynamic::columns_of_load;
-use super::{Excitation, Law, Named, Shape, Shaped, Tag, by_row, lagged, main, main_about, nuisance};
+use super::{Excitation, Law, Named, Shape, Shaped, Tag, by_row, main, main_about, nuisance};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     CauseName, CauseSpec, InTable, Kin, Need,
@@ -12,7 +12,7 @@ use crate::causes::spec::{
 /// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt
 /// when a session ended nears the temperature at which the next one begins.
 fn warmer_by(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
-    let felt = lagged(on, &on.rows.temperature, lag_s, true);
+    let felt = on.rows.lagged(&on.rows.temperature, lag_s, true);
     by_row(on, |k| felt[k] - on.nominal.temperature_c)
 }
 

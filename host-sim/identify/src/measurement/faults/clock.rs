@@ -1,6 +1,7 @@
 //! Time that does not run as it should, and the gaps that part sessions.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use super::{Findings, marked};
 use crate::measurement::columns::{MappedColumn, Quantity};
@@ -45,13 +46,7 @@ const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
 const EACH_WAY: (f64, f64) = (0.1, 6.0);
 /// And never changes its pace by more than this share of its fastest one from row to row. *Guess*.
 const SMOOTHLY: f64 = 0.35;
-/// A loop follows the clock: its phase takes this share of the distance of a stamp from where it is expected. *Guess*:
-/// it averages some forty stamps.
-const PHASE_GAIN: f64 = 0.05;
-/// The period of the loop takes this share of that distance. *Source*: derived, the loop is then damped by 1/√2 of
-/// critical.
-const PERIOD_GAIN: f64 = 0.5 * PHASE_GAIN * PHASE_GAIN;
-/// Rows on either side by which a row is assigned to its period. *Guess*: few, so that a lost row stays where it is.
+/// Rows on either side of a step by which rows are missing in it. *Guess*: few, so that a lost row stays where it is.
 const AROUND_ROWS: usize = 5;
 
 /// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
@@ -178,19 +173,17 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     // The median step may be shorter than the period that a clock keeps on the mean: no more rows are missing than the
     // time of a session leaves room for, as well as the median is known.
     let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (rows as f64).sqrt();
-    let mut room = 0.0;
-    let mut lost: Vec<(usize, u64)> = Vec::new();
-    for Counted { rows, period: periods } in counted(log, period) {
+    let room = |rows: Range<usize>| {
         let n = rows.len() as f64;
-        room += ((time[rows.end - 1] - time[rows.start]) / period - (n - 1.0) + unsure * n).max(0.0).round();
-        for (k, row) in rows.enumerate().skip(1) {
-            // Rows that are in the file, but were left out, are not lost.
-            let beyond = (periods[k] - periods[k - 1]).saturating_sub(log.line[row] - log.line[row - 1]);
-            if beyond > 0 && !strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2) {
-                lost.push((row, beyond));
-            }
-        }
-    }
+        ((time[rows.end - 1] - time[rows.start]) / period - (n - 1.0) + unsure * n).max(0.0).round()
+    };
+    let room: f64 = log.sessions().map(room).sum();
+    // Rows that are in the file, but were left out, are not lost.
+    let lost = missing(log, period).into_iter().filter_map(|(row, periods)| {
+        let beyond = periods.checked_sub(log.line[row] - log.line[row - 1] - 1).filter(|beyond| *beyond > 0)?;
+        (!strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2)).then_some((row, beyond))
+    });
+    let lost: Vec<(usize, u64)> = lost.collect();
     let total = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(room as u64);
     let places = lost.len().min(total as usize);
     if total > 0 && long.len() as f64 > UNEVEN_SHARE * rows as f64 {
@@ -207,37 +200,23 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     }
 }
 
-/// The rows of a session by the periods that its stamps count.
-struct Counted {
-    rows: std::ops::Range<usize>,
-    /// Period that each row belongs to, from 0; each row has one of its own.
-    period: Vec<u64>,
-}
-
-/// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up.
-/// A stamp that scatters into a period next to its own is counted with its neighbours.
-fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
+/// Rows before which rows are missing, each with how many, by the stamps of the rows around: so a stamp that scatters
+/// into the period of its neighbour shows none.
+fn missing(log: &Log, period_s: f64) -> Vec<(usize, u64)> {
     let time = log.get(Quantity::Time).unwrap_or_default();
-    log.sessions().map(move |rows| {
-        let (mut expected, mut step_s, mut count) = (time[rows.start], period_s, 0.0);
-        // Periods beyond those of the rows.
-        let mut beyond = vec![0.0];
-        for row in rows.start + 1..rows.end {
-            let steps = ((time[row] - expected) / step_s).round().max(0.0);
-            count += steps;
-            let off = time[row] - expected - steps * step_s;
-            expected += steps * step_s + PHASE_GAIN * off;
-            step_s = (step_s + PERIOD_GAIN * off / steps.max(1.0)).clamp(0.9 * period_s, 1.1 * period_s);
-            beyond.push(count - (row - rows.start) as f64);
-        }
-        let mut most = 0.0f64;
-        let around = |k: usize| beyond[k.saturating_sub(AROUND_ROWS)..(k + AROUND_ROWS + 1).min(beyond.len())].to_vec();
-        let period = (0..rows.len()).map(|k| {
-            most = most.max(median_of(&mut around(k)));
-            k as u64 + most as u64
-        });
-        Counted { period: period.collect(), rows }
-    })
+    let of_session = |rows: Range<usize>| {
+        let late = |of: Range<usize>| median_of(&mut of.map(|k| time[k] / period_s - k as f64).collect::<Vec<f64>>());
+        let (start, end) = (rows.start, rows.end);
+        rows.skip(1).filter_map(move |row| {
+            if time[row] - time[row - 1] <= LOST_ROW_PERIODS * period_s {
+                return None;
+            }
+            let (before, after) = (row.saturating_sub(AROUND_ROWS).max(start)..row, row..(row + AROUND_ROWS).min(end));
+            let periods = late(after) - late(before);
+            (periods > 0.5).then_some((row, periods.round() as u64))
+        })
+    };
+    log.sessions().flat_map(of_session).collect()
 }
 
 /// Stamps that scatter while the motion from row to row does not.
@@ -270,14 +249,16 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
             100.0 * motion_scatter
         )
     });
-    let sessions: Vec<Counted> = counted(log, period).collect();
+    let (sessions, missing): (Vec<Range<usize>>, _) = (log.sessions().collect(), missing(log, period));
+    let mut place: Vec<f64> = (0..log.len()).map(|row| row as f64).collect();
+    for (from, periods) in missing {
+        place[from..].iter_mut().for_each(|place| *place += periods as f64);
+    }
     let Some(time) = log.get_mut(Quantity::Time) else { return };
-    for Counted { rows, period } in sessions {
-        let (from, to) = (time[rows.start], time[rows.end - 1]);
-        let last = period[period.len() - 1].max(1) as f64;
-        for (row, period) in rows.zip(period) {
-            time[row] = from + (to - from) * period as f64 / last;
-        }
+    for rows in sessions {
+        let (from, to, last) = (time[rows.start], time[rows.end - 1], rows.end - 1);
+        let step = (to - from) / (place[last] - place[rows.start]).max(1.0);
+        rows.clone().for_each(|row| time[row] = from + step * (place[row] - place[rows.start]));
     }
 }
 
