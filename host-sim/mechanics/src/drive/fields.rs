@@ -17,7 +17,7 @@ pub(super) struct Field {
 }
 
 /// A section of the file.
-pub(super) struct Section {
+pub(super) struct FieldSection {
     pub name: &'static str,
     /// For the comment in a written file.
     pub contents: &'static str,
@@ -118,7 +118,7 @@ macro_rules! section {
         }
 
         impl $type {
-            pub(super) const SECTION: super::fields::Section = super::fields::Section {
+            pub(super) const SECTION: super::fields::FieldSection = super::fields::FieldSection {
                 name: stringify!($section),
                 contents: $contents,
                 fields: &[$(super::fields::Field {
@@ -134,7 +134,7 @@ macro_rules! section {
 pub(super) use section;
 
 /// All sections, in the order of a written file.
-pub(super) static SECTIONS: [Section; 9] = [
+pub(super) static SECTIONS: [FieldSection; 9] = [
     Flexspline::SECTION,
     CircularSpline::SECTION,
     Material::SECTION,

@@ -24,7 +24,6 @@ const LAST_STEP: f64 = 1e-8;
 /// A wave generator in its own frame (major axis along +x).
 #[derive(Debug, Clone)]
 pub struct GeneratorOutline {
-    kind: GeneratorKind,
     neutral: NeutralCurve,
     /// inward offset from the neutral curve to the bore, mm
     offset: f64,
@@ -136,17 +135,12 @@ impl GeneratorOutline {
         }
         let centre =
             direction(built.generator_eccentricity_phase_deg).map(|x| 1e-3 * built.generator_eccentricity_um * x);
-        Ok(GeneratorOutline { kind, neutral, offset, scale: drive.thermal_state.generator_scale, centre, contour })
+        Ok(GeneratorOutline { neutral, offset, scale: drive.thermal_state.generator_scale, centre, contour })
     }
 
     /// Where the outline stands beside the axis it turns about, in the generator frame, mm.
     pub(crate) fn centre(&self) -> [f64; 2] {
         self.centre.map(|x| x * self.scale)
-    }
-
-    /// Which generator this is.
-    pub fn kind(&self) -> GeneratorKind {
-        self.kind
     }
 
     /// The neutral curve the generator is made for, at reference temperature.

@@ -63,11 +63,6 @@ impl NeutralCurve {
         curve
     }
 
-    /// The closed form the curve is made from.
-    pub fn shape(&self) -> &RingShape {
-        &self.shape
-    }
-
     /// Radius `R` of the undeformed neutral layer, mm.
     pub fn radius_mm(&self) -> f64 {
         self.radius_mm
@@ -76,11 +71,6 @@ impl NeutralCurve {
     /// The second-order constant `c`, mm.
     pub fn constant_mm(&self) -> f64 {
         self.constant_mm
-    }
-
-    /// First-order circumferential displacement, mm, with `phi` +.
-    pub fn v(&self, phi: f64) -> f64 {
-        self.shape.v(phi)
     }
 
     /// `[r, r', r'']` of the exact curve at polar angle `alpha`.
@@ -187,7 +177,7 @@ mod tests {
     fn the_perimeter_is_that_of_the_undeformed_ring() {
         for curve in curves() {
             let error = perimeter(&curve) - 2.0 * PI * curve.radius_mm();
-            assert!(error.abs() < 1e-9, "{:?}: {error} mm", curve.shape());
+            assert!(error.abs() < 1e-9, "{:?}: {error} mm", curve.shape);
         }
     }
 
@@ -210,7 +200,7 @@ mod tests {
             for k in 1..1000 {
                 let phi = FRAC_PI_2 * f64::from(k) / 1000.0;
                 let alpha = curve.polar_angle(phi);
-                let b = curve.shape().break_angle();
+                let b = curve.shape.break_angle();
                 let length = if alpha > b {
                     curve.length_between(0.0, b) + curve.length_between(b, alpha)
                 } else {
@@ -218,7 +208,7 @@ mod tests {
                 };
                 worst = worst.max((length - phi * curve.radius_mm()).abs());
             }
-            assert!(worst < 1e-12, "{:?}: {worst} mm", curve.shape());
+            assert!(worst < 1e-12, "{:?}: {worst} mm", curve.shape);
         }
     }
 
@@ -234,7 +224,7 @@ mod tests {
                 assert!((x + xp).abs() + (y + yp).abs() + (turned - normal - 3.0 * PI).abs() < 1e-12);
                 // w0²/R is 5 µm; positions and rotation differ by a few of those
                 let alpha = y.atan2(x);
-                assert!((alpha * curve.radius_mm() - phi * curve.radius_mm() - curve.v(phi)).abs() < 0.012);
+                assert!((alpha * curve.radius_mm() - phi * curve.radius_mm() - curve.shape.v(phi)).abs() < 0.012);
                 let theta = curve.shape.theta(phi, curve.radius_mm);
                 assert!((normal - phi - theta).abs() < 6e-4, "{} {theta}", normal - phi);
             }
