@@ -40,6 +40,7 @@ emulate_c() { # ARGUMENTS OF GCC...: builds a program in C for the Cortex-M4F an
     "${cortex[@]}" -nostdlib -Wl,--gc-sections -z noexecstack -L. -T tests/firmware/c/{link.ld,startup.c} "$@" -lgcc -o "$out/elf"
     emulate "$out/elf"
 }
+size() { arm-none-eabi-size "$1" | awk -v column="$2" 'END { print $column }'; } # ELF COLUMN
 within() { # NAME...: the largest number after each in $out/figures is no more than tests/firmware/budget has
     for name in "$@"; do
         awk -v name="$name" 'NR == FNR { if ($1 == name) most = $2; next }

@@ -3,6 +3,7 @@
 Table of MC_TableBasedPositionCompensation (TwinCAT NC, Tc2_MC2): Compensation is added to Position,
 degrees, equidistant. One value for all directions of the CSV: their mean, so where the joint always
 comes from one side, export with --direction + or - and set TableParameter.Direction so.
+Limits and signs: infosys.beckhoff.com, Tc2_MC2 17316396939, 12929471627.
 """
 
 import math

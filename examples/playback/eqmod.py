@@ -5,6 +5,7 @@ for each second of a generator turn (its worm). A rate begins half a second late
 curve is made for that. Made for the direction of the CSV (--direction + or -), northern hemisphere,
 gain 1, threshold 0; EQMOD's worm has to be StepsPerWorm. MOTOR_ZERO is the mount's counter at the
 generator's zero.
+Limits and signs: JPhilC/EQMOD-VB6-To-C- 3da9e78b PEC.bas.
 """
 
 import math

@@ -3,6 +3,7 @@
 Screw compensation of LinuxCNC, COMP_FILE_TYPE = 1: nominal position, trim forward, trim backward;
 degrees; trims are added to the command, linear between triplets, at most 256 for a joint.
 The joint's zero and positive direction are those of the table's output. `--direction both`.
+Limits and signs: LinuxCNC/linuxcnc 5c41560e src/emc/motion.
 """
 
 import math

@@ -4,6 +4,7 @@ Encoder compensation of moteus for the source (0 to 2) on the generator: 256 int
 turn, in 127ths of a scale in turns, added to the reading. It holds what repeats every generator
 turn. Write it with moteus_tool --write-config, then `conf write`; the zero of the source has to be
 the generator's. Every line is a command to the device, so there is no comment.
+Limits and signs: mjbots/moteus db1a7623 fw/motor_position.h.
 """
 
 import math

@@ -4,6 +4,7 @@ Periodic error commands of OnStepX: an int8 of motor steps for each sidereal sec
 turn (its worm). A second plays the entry before its own. Made for tracking in the direction of the
 CSV (--direction + or -), the worm index at the generator's zero. Config.h needs the two settings
 that are printed on standard error; `:$QZ+#` starts it.
+Limits and signs: hjd1964/OnStepX 89c9ca4c src/telescope/mount/pec.
 """
 
 import math

@@ -3,6 +3,7 @@
 SimpleTransmission of ros2_control: joint position = actuator position / reduction + offset, rad. It
 holds no curve: the ratio and the mean error, all that changes with the angle stays. A transmission
 with a table is a plug-in of your own around the core.
+Limits and signs: ros-controls/ros2_control 53b9999d simple_transmission.hpp.
 """
 
 from curve import arguments

@@ -24,7 +24,7 @@
 
 #define COUNTS_PER_RAD (4294967296.0 / 6.283185307179586)
 #define MOST_TORQUES 64u
-#define MOST_BYTES 4096u
+#define MOST_BYTES 8192u
 
 /* A table without ripple, with one temperature. */
 typedef struct {
@@ -59,14 +59,19 @@ static uint32_t crc(const uint8_t *bytes, uint32_t count)
 }
 
 /* The checksums of pages and of all, over whatever stands there. */
-static void seal(made *of)
+static void seal_body(made *of, uint32_t body)
 {
-    const uint32_t body = 4u * (136u + 3u * (of->torques > 1u ? of->torques : 2u)), pages = (body + 255u) / 256u;
+    const uint32_t pages = (body + 255u) / 256u;
     of->bytes = body + 4u * (pages + 1u);
     put(of, 3, of->bytes);
     for (uint32_t page = 0; page < pages; page++)
         put(of, body / 4u + page, crc(of->image + 256u * page, body - 256u * page < 256u ? body - 256u * page : 256u));
     put(of, of->bytes / 4u - 1u, crc(of->image, of->bytes - 4u));
+}
+
+static void seal(made *of)
+{
+    seal_body(of, 4u * (136u + 3u * (of->torques > 1u ? of->torques : 2u)));
 }
 
 static void write_image(made *of)
@@ -154,6 +159,22 @@ static fxt_verdict with_number(uint32_t at, float value)
     return verdict_of(&of);
 }
 
+/* A curve over a turn that does not end where it begins. */
+static int curves(void)
+{
+    static made of;
+    FILE *file = fopen("core/src/fixtures/long.fxt", "rb");
+    EXPECT(file != NULL);
+    of.bytes = (uint32_t)fread(of.image, 1, sizeof of.image, file);
+    (void)fclose(file);
+    EXPECT(verdict_of(&of).reason == FXT_OK);
+    const uint32_t at = of.image[176] + 256u * of.image[177], body = 4u * (of.image[196] + 256u * of.image[197]);
+    of.image[4u * at] ^= 1u;
+    seal_body(&of, body);
+    EXPECT(verdict_of(&of).reason == FXT_NOT_CLOSED && verdict_of(&of).field == FXT_GENERATOR_CURVE);
+    return 0;
+}
+
 static int images(void)
 {
     made of = plain();
@@ -210,7 +231,15 @@ static int images(void)
     of.mean[4] = of.mean[3] - (float)(1e-4 * COUNTS_PER_RAD);
     write_image(&of);
     EXPECT(verdict_of(&of).reason == FXT_FALLS && verdict_of(&of).index == 4u);
-    return 0;
+    /* One torque has no slope. */
+    of.torques = 1;
+    write_image(&of);
+    EXPECT(verdict_of(&of).reason == FXT_OK);
+    put_number(&of, 137, 1.0f);
+    put_number(&of, 140, 1.0f);
+    seal(&of);
+    EXPECT(verdict_of(&of).reason == FXT_OUT_OF_RANGE && verdict_of(&of).field == FXT_MEAN_SLOPE);
+    return curves();
 }
 
 /* A processor that rounds otherwise, or takes small numbers for zero, has other bits: nothing is opened. */
@@ -541,6 +570,39 @@ static int wrong_in_a_row(void)
     return 0;
 }
 
+/* For longer than a counter of 16 bits: a reading that may be of another turn is none, and a torque that comes back finds the side unknown. A target
+ * half a turn of the output away is commanded, with a correction within its limits. */
+static int for_long(void)
+{
+    const made of = plain();
+    fxt_table table;
+    fxt_joint joint;
+    fxt_encoder encoder;
+    int64_t now = 0;
+    EXPECT(fxt_open(&table, of.image, of.bytes).reason == FXT_OK && fxt_joint_init(&joint, &usual) == FXT_LIMITS_OK);
+    EXPECT(fxt_encoder_init(&encoder, 1 << 20, 0, false, 0) && fxt_encoder_start(&encoder, 0, 0) && fxt_joint_request(&joint, FXT_TRACKING));
+    fxt_input input = {0, 0, 5.0f, 20.0f, 0, true};
+    for (int tick = 0; tick < 5; tick++) {
+        (void)fxt_tick(&table, &joint, &input);
+        input.generator += 1 << 26;
+    }
+    EXPECT(fxt_play_known(&joint.play));
+    input.has_generator = false;
+    input.torque_n_m = NAN;
+    for (int tick = 0; tick <= UINT16_MAX; tick++)
+        EXPECT((fxt_tick(&table, &joint, &input).flags & FXT_NOT_CORRECTED) != 0u);
+    EXPECT(!fxt_joint_read(&joint, &encoder, 1 << 19, &now) && fxt_encoder_is_lost(&encoder));
+    input.has_generator = true;
+    input.torque_n_m = 5.0f;
+    fxt_output out = fxt_tick(&table, &joint, &input);
+    EXPECT(out.quality == FXT_UNCERTAIN);
+    input.target = out.output + INT32_MIN;
+    out = fxt_tick(&table, &joint, &input);
+    EXPECT(out.output + INT32_MIN == input.target && fabsf(out.correction_rad) < 1e-2f);
+    EXPECT(llabs(out.command - 95 * input.target) < INT64_C(1) << 32);
+    return 0;
+}
+
 static int encoders(void)
 {
     fxt_joint joint;
@@ -586,7 +648,7 @@ static int encoders(void)
         limits.generator_rate_rad_s = bits == 13 ? 2100.0f : 1050.0f;
         EXPECT(fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK && fxt_joint_read(&joint, &encoder, 1, &angle) == (bits > 13));
     }
-    return 0;
+    return for_long();
 }
 
 static int radians(void)

@@ -446,7 +446,7 @@ impl Store {
     /// Takes `words` words of the images into the CRC-32 of their pages: shows which of two images is damaged, and
     /// finds what both have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each
     /// time: a word takes at most 733 instructions, and with 16 words every 100 ms the copies follow the temperature
-    /// within 6 s.
+    /// within 6.4 s where the store is full.
     pub fn check_images(&mut self, images: &Images<'_>, words: usize) {
         self.mend_source();
         let strangers = self.strangers(images);
