@@ -1861,7 +1861,9 @@ static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
     const int64_t sample = present ? input->generator : now->generator, way = minus(sample, now->generator);
     const int32_t step = i32((uint32_t)way), bend = saturate((int64_t)step - now->step), size = bend_size(bend);
     const int32_t largest_bend = now->largest_bend > noise ? now->largest_bend : noise, spike = now->spike > noise ? now->spike : noise;
-    const bool wide = way != step, far = was_sampled && size_of(way) > (uint64_t)(uint32_t)now->largest_move;
+    /* As far as it may in each tick since the last. */
+    const uint64_t most = (uint64_t)(uint32_t)now->largest_move * (input->missed_ticks + 1u);
+    const bool wide = way != step, far = was_sampled && size_of(way) > most;
     /* The way of a tick that came late is that of several. */
     const uint32_t row = present && input->missed_ticks == 0u ? now->in_a_row : 0u;
     /* The sample before was out, and this one is back: without that one the way would hardly have changed. */
@@ -1877,7 +1879,8 @@ static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
     is.forgotten = believed || (was_sampled && now->uncorrected > now->patience);
     /* A tick in which a new place is believed has no way. */
     const uint32_t more = row < HAS_BEND ? row + 1u : HAS_BEND, in_a_row = is.good && !believed ? more : 0u;
-    const uint32_t unseen = now->unseen < UINT16_MAX ? now->unseen + 1u : now->unseen;
+    /* In a late tick one that is wrong may be off by the way of as many more. */
+    const uint32_t passed = now->unseen + 1u + 2u * input->missed_ticks, unseen = passed < UINT16_MAX ? passed : UINT16_MAX;
     now->glitches = (uint16_t)(believed ? 0u : glitches);
     now->generator = is.glitch ? now->generator : sample;
     now->sampled = was_sampled || is.good ? 1u : 0u;
@@ -1903,14 +1906,13 @@ static int32_t goal_of(fxt_joint *now, bool late, int32_t wanted_counts, bool sa
     const uint32_t missing = now->uncorrected < UINT16_MAX ? now->uncorrected + 1u : now->uncorrected;
     now->uncorrected = (uint16_t)(sane ? 0u : missing);
     const bool off = now->uncorrected > now->patience || (now->mode != FXT_TRACKING && now->mode != FXT_HOLD);
-    const bool keep = now->mode == FXT_HOLD || (late && now->hold_late != 0u);
-    if (!keep) {
-        const int32_t wanted = sane ? mul(wanted_counts, FINE) : now->goal;
-        now->goal = off ? 0 : wanted;
-    }
-    /* Down in `fade` ticks, none for as many; without that policy `fade` is 0. */
-    const uint32_t start = now->fade * 2u, left = now->fading > 0u ? now->fading - 1u : 0u;
-    now->fading = late ? start : left;
+    const bool keep = !sane || now->mode == FXT_HOLD || (late && now->hold_late != 0u);
+    const int32_t wanted = keep ? now->goal : mul(wanted_counts, FINE);
+    /* Whatever is to be kept. */
+    now->goal = off ? 0 : wanted;
+    /* Down in `fade` ticks, late or not, and none for as many, with each late one anew; without that policy `fade` is 0. */
+    const uint32_t left = now->fading > 0u ? now->fading - 1u : 0u, least = late ? now->fade : 0u, start = now->fading > 0u ? 0u : least;
+    now->fading = (left > least ? left : least) + start;
     const uint32_t above = now->fading > now->fade ? now->fading - now->fade : 0u;
     return now->fading > 0u ? part_of(now->goal, (float)above * now->fade_step) : now->goal;
 }
