@@ -317,7 +317,7 @@ void a_sample_moves_no_further_than_a_tick_allows_or_is_doubted(void)
     const judged is = judge(&joint, &input, nondet_int());
     const int64_t way = minus(joint.generator, before.generator);
     const uint64_t most = (uint64_t)(uint32_t)before.largest_move * (input.missed_ticks + 1u);
-    PROMISE(size_of(way) <= most || is.forgotten || is.back || before.sampled == 0u);
+    PROMISE(size_of(way) <= most || before.glitches >= before.patience || is.back || before.sampled == 0u);
     PROMISE(joint.generator == before.generator || (input.has_generator && joint.generator == input.generator));
     PROMISE(joint.glitches <= joint.patience && (!is.good || joint.sampled != 0u) && is.good == (input.has_generator && !is.glitch));
     /* Only after three in a row that were believed, and within a turn, is the one before taken back. */
