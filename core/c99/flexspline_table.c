@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /** @file
  * See flexspline_table.h. Each function has the name of what it follows in the Rust core (core/src/table, core/src/play.rs, core/src/drive.rs),
- * where the reasons are told; the order of every sum and product is the core's, so that all bits are. */
+ * where the reasons are told; the order of sums and products is the core's, so that all bits are. Where a result is a whole number that does
+ * not hang on it (`stoppable`, judging samples) it may be reached in another way. */
 #include "flexspline_table.h"
 
 #include <float.h>
@@ -276,11 +277,31 @@ static uint32_t crc32_of(const uint8_t *bytes, uint32_t count)
     return ~crc_bytes(0xffffffffu, bytes, count);
 }
 
+/* A table and its pages as they lie in memory, which may have changed. */
+
+static uint32_t sum_of(const fxt_table *table)
+{
+    return crc32_of((const uint8_t *)table, (uint32_t)offsetof(fxt_table, sum));
+}
+
+static uint32_t pages_of(const fxt_table *table)
+{
+    return (table->body_bytes + PAGE_BYTES - 1u) / PAGE_BYTES;
+}
+
+static bool page_matches(const fxt_table *table, uint32_t page)
+{
+    const uint32_t at = page * PAGE_BYTES, left = table->body_bytes - at;
+    uint32_t sum;
+    words_from(table->image, table->bytes, table->body_bytes + 4u * page, 1, &sum);
+    return crc32_of(table->image + at, left < PAGE_BYTES ? left : PAGE_BYTES) == sum;
+}
+
 /* The drive: tooth counts and the nominal motion. */
 
 static fxt_factor factor_new(uint32_t times, uint32_t over)
 {
-    fxt_factor factor = {0, times / over};
+    fxt_factor factor = {0, times / over, 0};
     uint32_t remainder = times % over;
     for (int digit = 0; digit < 4; digit++) {
         const uint32_t part = remainder << 16;
@@ -307,7 +328,7 @@ static fxt_rate rate_new(const fxt_factor *factor, uint32_t times, bool reversed
 {
     const uint64_t below = (uint64_t)(uint32_t)factor->fraction * times;
     const uint64_t whole = ((uint64_t)factor->whole << 32) + (factor->fraction >> 32);
-    fxt_rate rate = {whole * times + (below >> 32), (uint32_t)below};
+    fxt_rate rate = {whole * times + (below >> 32), (uint32_t)below, 0};
     if (reversed) {
         rate.rest = 0u - rate.rest;
         rate.periods = ~rate.periods + (rate.rest == 0u ? 1u : 0u);
@@ -337,13 +358,13 @@ static inline int64_t plus(int64_t angle, int64_t counts)
 static int64_t nominal_output(const fxt_table *table, int64_t generator)
 {
     const int64_t output = factor_of(&table->to_output, generator);
-    return table->reversed ? minus(0, output) : output;
+    return table->reversed != 0u ? minus(0, output) : output;
 }
 
 static int64_t nominal_generator(const fxt_table *table, int64_t output)
 {
     const int64_t generator = factor_of(&table->to_generator, output);
-    return table->reversed ? minus(0, generator) : generator;
+    return table->reversed != 0u ? minus(0, generator) : generator;
 }
 
 /* a - b in counts if that is within half a turn, else a quarter turn with its sign. */
@@ -677,15 +698,9 @@ static const play_state unknown_state = {0, 0, INT32_MIN, INT32_MAX, -1, {0, 0}}
 /* Each number of a fxt_play is kept beside that of an unknown side, so that memory of zeros is one: a known play may be all zero here. */
 static inline play_state state_of(const fxt_play *play)
 {
-    play_state is = unknown_state;
-    if (play == NULL) {
-        return is;
-    }
-    is.nominal = play->nominal;
-    is.error = play->error;
-    is.lower = i32(play->lower ^ 0x80000000u);
-    is.upper = i32(play->upper ^ 0x7fffffffu);
-    is.half = i32(~play->half);
+    static const fxt_play no_play;
+    const fxt_play *of = play != NULL ? play : &no_play;
+    const play_state is = {of->nominal, of->error, i32(of->lower ^ 0x80000000u), i32(of->upper ^ 0x7fffffffu), i32(~of->half), {0, 0}};
     return is;
 }
 
@@ -935,16 +950,17 @@ static bool check_drive(check *is, const uint8_t *image)
     if (flexspline == 0u || waves == 0u || waves > flexspline) {
         return refuse(is, FXT_TEETH, FXT_NO_FIELD, flexspline, 0);
     }
-    table->reversed = image[105] == 1u;
-    const uint32_t teeth = table->reversed ? flexspline : circular;
-    table->ripple_order = table->reversed ? circular : flexspline;
+    const bool reversed = image[105] == 1u;
+    const uint32_t teeth = reversed ? flexspline : circular;
+    table->reversed = image[105];
+    table->ripple_order = reversed ? circular : flexspline;
     table->to_output = factor_new(waves, teeth);
     table->to_generator = factor_new(teeth, waves);
-    table->generator_rate = rate_new(&table->to_generator, 1, table->reversed);
-    table->tooth_rate = rate_new(&table->to_generator, table->ripple_order, table->reversed);
+    table->generator_rate = rate_new(&table->to_generator, 1, reversed);
+    table->tooth_rate = rate_new(&table->to_generator, table->ripple_order, reversed);
     is->circular_spline_teeth = circular;
     is->ratio = (float)teeth / (float)waves;
-    is->ratio = table->reversed ? -is->ratio : is->ratio;
+    is->ratio = reversed ? -is->ratio : is->ratio;
     is->tooth_periods = is->ratio * (float)table->ripple_order;
     return true;
 }
@@ -1002,8 +1018,7 @@ static bool check_identity(check *is, const uint8_t *image)
     is->record = ripple_row(is->ripple_nodes);
     is->end = is->records + is->record * is->torques * is->temperatures;
     is->table->body_bytes = 4u * is->end;
-    const uint32_t pages = (is->table->body_bytes + PAGE_BYTES - 1u) / PAGE_BYTES;
-    const uint32_t needed = is->table->body_bytes + 4u * (pages + 1u);
+    const uint32_t needed = is->table->body_bytes + 4u * (pages_of(is->table) + 1u);
     if (needed != is->table->bytes) {
         return refuse(is, FXT_SIZE, FXT_NO_FIELD, needed, 0);
     }
@@ -1410,9 +1425,28 @@ static bool arithmetic_is_exact(void)
 /* One that was refused. */
 static const fxt_table no_table;
 
+/* A change of one word always changes it, as the factor is odd: that of the core's sums (core/src/whole.rs). */
+#define SUM_FACTOR 4294957665u
+static inline uint32_t factor_sum_of(const fxt_factor *factor, uint32_t sum)
+{
+    const uint32_t lower = sum * SUM_FACTOR + (uint32_t)factor->fraction, upper = lower * SUM_FACTOR + (uint32_t)(factor->fraction >> 32);
+    return upper * SUM_FACTOR + factor->whole;
+}
+
+static inline uint32_t ratio_sum_of(const fxt_table *table)
+{
+    return factor_sum_of(&table->to_generator, factor_sum_of(&table->to_output, table->reversed));
+}
+
+/* Where memory changed, nothing is read beyond the image, and no command is away by turns: neither is bounded by the limit of the table. */
 static inline const fxt_table *given(const fxt_table *table)
 {
-    return table != NULL ? table : &no_table;
+    return table != NULL && table->image == table->again && table->ratio_sum == ratio_sum_of(table) ? table : &no_table;
+}
+
+static bool is_whole(const fxt_table *table)
+{
+    return table->image != NULL && table->sum == sum_of(table);
 }
 
 /* All checks in their order. */
@@ -1420,12 +1454,13 @@ static bool check_image(check *is, const uint8_t *image, uint32_t bytes)
 {
     fxt_table *table = is->table;
     table->image = image;
+    table->again = image;
     table->bytes = bytes;
     if (!check_identity(is, image)) {
         return false;
     }
-    for (uint32_t page = 0u; page < fxt_page_count(table); page++) {
-        if (!fxt_page_intact(table, page)) {
+    for (uint32_t page = 0u; page < pages_of(table); page++) {
+        if (!page_matches(table, page)) {
             return refuse(is, FXT_PAGE_CRC, FXT_NO_FIELD, page, 0);
         }
     }
@@ -1448,6 +1483,8 @@ static void fill_in(fxt_table *table, const check *is)
     for (uint32_t i = 0u; i < 6u; i++) {
         table->bounds[i] = bounds[i];
     }
+    table->ratio_sum = ratio_sum_of(table);
+    table->sum = sum_of(table);
 }
 
 fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
@@ -1492,8 +1529,7 @@ const char *fxt_field_name(fxt_field field)
 
 fxt_info fxt_tell(const fxt_table *table)
 {
-    static const fxt_info none;
-    fxt_info info = none;
+    fxt_info info = {0};
     const uint8_t *image = given(table)->image;
     if (image == NULL) {
         return info;
@@ -1523,9 +1559,9 @@ fxt_info fxt_tell(const fxt_table *table)
         info.temperature_range_c[i] = number_at(table, AT_TEMPERATURE_RANGE + i);
     }
     const uint32_t waves = (uint32_t)info.circular_spline_teeth - info.flexspline_teeth;
-    const uint32_t teeth = table->reversed ? info.flexspline_teeth : info.circular_spline_teeth;
+    const uint32_t teeth = table->reversed != 0u ? info.flexspline_teeth : info.circular_spline_teeth;
     const float ratio = (float)teeth / (float)(waves > 0u ? waves : 1u);
-    info.ratio = table->reversed ? -ratio : ratio;
+    info.ratio = table->reversed != 0u ? -ratio : ratio;
     info.error_limit_rad = number_at(table, 38);
     info.solver_residual = number_at(table, 31);
     info.projection_worst_rad = number_at(table, 32);
@@ -1537,18 +1573,12 @@ fxt_info fxt_tell(const fxt_table *table)
 
 uint32_t fxt_page_count(const fxt_table *table)
 {
-    return (given(table)->body_bytes + PAGE_BYTES - 1u) / PAGE_BYTES;
+    return is_whole(given(table)) ? pages_of(table) : 1u;
 }
 
 bool fxt_page_intact(const fxt_table *table, uint32_t page)
 {
-    if (page >= fxt_page_count(table)) {
-        return false;
-    }
-    const uint32_t at = page * PAGE_BYTES, left = table->body_bytes - at;
-    uint32_t sum;
-    words_from(table->image, table->bytes, table->body_bytes + 4u * page, 1, &sum);
-    return crc32_of(table->image + at, left < PAGE_BYTES ? left : PAGE_BYTES) == sum;
+    return page < fxt_page_count(table) && is_whole(given(table)) && page_matches(table, page);
 }
 
 fxt_play fxt_play_unknown(void)
@@ -1633,19 +1663,14 @@ bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
     return true;
 }
 
-/* Located for a call with a play; without one nothing can be corrected. */
-static inline point locate_with(const fxt_table *table, float torque_n_m, float temperature_c, const fxt_play *play)
-{
-    point at = locate(table, torque_n_m, temperature_c);
-    at.finite = at.finite && play != NULL;
-    return at;
-}
-
+/* Without a play nothing can be corrected. */
 fxt_prediction fxt_forward(const fxt_table *table, fxt_play *play, int64_t generator, float torque_n_m, float temperature_c)
 {
-    const point at = locate_with(given(table), torque_n_m, temperature_c, play);
+    const fxt_table *of = given(table);
+    point at = locate(of, torque_n_m, temperature_c);
+    at.finite = at.finite && play != NULL;
     play_state is = state_of(play);
-    const fxt_prediction now = follow(given(table), &at, &is, generator);
+    const fxt_prediction now = follow(of, &at, &is, generator);
     if (play != NULL) {
         *play = kept(&is);
     }
@@ -1654,23 +1679,28 @@ fxt_prediction fxt_forward(const fxt_table *table, fxt_play *play, int64_t gener
 
 fxt_command fxt_inverse(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, fxt_direction direction)
 {
-    const point at = locate(given(table), torque_n_m, temperature_c);
-    return aim_moving(given(table), &at, target, direction == FXT_BACKWARD);
+    const fxt_table *of = given(table);
+    const point at = locate(of, torque_n_m, temperature_c);
+    return aim_moving(of, &at, target, direction == FXT_BACKWARD);
 }
 
 fxt_command fxt_inverse_from(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, const fxt_play *play)
 {
-    const point at = locate_with(given(table), torque_n_m, temperature_c, play);
+    const fxt_table *of = given(table);
+    point at = locate(of, torque_n_m, temperature_c);
+    at.finite = at.finite && play != NULL;
     const play_state is = state_of(play);
-    return aim_from(given(table), &at, target, &is);
+    return aim_from(of, &at, target, &is);
 }
 
 void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t target, float torque_n_m, float temperature_c,
               fxt_prediction *prediction, fxt_command *command)
 {
-    const point at = locate_with(given(table), torque_n_m, temperature_c, play);
+    const fxt_table *of = given(table);
+    point at = locate(of, torque_n_m, temperature_c);
+    at.finite = at.finite && play != NULL;
     play_state is = state_of(play);
-    const fxt_prediction now = follow(given(table), &at, &is, measured);
+    const fxt_prediction now = follow(of, &at, &is, measured);
     if (play != NULL) {
         *play = kept(&is);
     }
@@ -1678,7 +1708,7 @@ void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t 
         *prediction = now;
     }
     if (command != NULL) {
-        *command = aim_from(given(table), &at, target, &is);
+        *command = aim_from(of, &at, target, &is);
     }
 }
 
@@ -1736,7 +1766,7 @@ static bool may_be(double counts, double least, double most)
 fxt_limit fxt_joint_init(fxt_joint *joint, const fxt_limits *limits)
 {
     static const fxt_limits no_limits;
-    static const fxt_joint no_joint;
+    const fxt_joint no_joint = {0};
     if (joint == NULL) {
         return FXT_NO_JOINT;
     }
@@ -1839,7 +1869,8 @@ static uint64_t size_of(int64_t way)
 /* A change of the way from tick to tick that noise makes, counts of the generator: twice the dead band. */
 static int32_t noise_of(const fxt_table *table, const fxt_joint *joint)
 {
-    const uint64_t counts = size_of(nominal_generator(table, (int64_t)joint->hold * 2));
+    const uint32_t way = (uint32_t)joint->hold * 2u;
+    const uint64_t counts = (uint64_t)factor_of(&table->to_generator, (int64_t)way);
     return counts > (uint64_t)(uint32_t)joint->largest_move ? joint->largest_move : i32((uint32_t)counts);
 }
 
@@ -1861,7 +1892,9 @@ static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
     const int64_t sample = present ? input->generator : now->generator, way = minus(sample, now->generator);
     const int32_t step = i32((uint32_t)way), bend = saturate((int64_t)step - now->step), size = bend_size(bend);
     const int32_t largest_bend = now->largest_bend > noise ? now->largest_bend : noise, spike = now->spike > noise ? now->spike : noise;
-    const bool wide = way != step, far = was_sampled && size_of(way) > (uint64_t)(uint32_t)now->largest_move;
+    /* As far as it may in each tick since the last. */
+    const uint64_t most = (uint64_t)(uint32_t)now->largest_move * (input->missed_ticks + 1u);
+    const bool wide = way != step, far = was_sampled && size_of(way) > most;
     /* The way of a tick that came late is that of several. */
     const uint32_t row = present && input->missed_ticks == 0u ? now->in_a_row : 0u;
     /* The sample before was out, and this one is back: without that one the way would hardly have changed. */
@@ -1877,7 +1910,8 @@ static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
     is.forgotten = believed || (was_sampled && now->uncorrected > now->patience);
     /* A tick in which a new place is believed has no way. */
     const uint32_t more = row < HAS_BEND ? row + 1u : HAS_BEND, in_a_row = is.good && !believed ? more : 0u;
-    const uint32_t unseen = now->unseen < UINT16_MAX ? now->unseen + 1u : now->unseen;
+    /* In a late tick one that is wrong may be off by the way of as many more. */
+    const uint32_t passed = now->unseen + 1u + 2u * input->missed_ticks, unseen = passed < UINT16_MAX ? passed : UINT16_MAX;
     now->glitches = (uint16_t)(believed ? 0u : glitches);
     now->generator = is.glitch ? now->generator : sample;
     now->sampled = was_sampled || is.good ? 1u : 0u;
@@ -1903,14 +1937,13 @@ static int32_t goal_of(fxt_joint *now, bool late, int32_t wanted_counts, bool sa
     const uint32_t missing = now->uncorrected < UINT16_MAX ? now->uncorrected + 1u : now->uncorrected;
     now->uncorrected = (uint16_t)(sane ? 0u : missing);
     const bool off = now->uncorrected > now->patience || (now->mode != FXT_TRACKING && now->mode != FXT_HOLD);
-    const bool keep = now->mode == FXT_HOLD || (late && now->hold_late != 0u);
-    if (!keep) {
-        const int32_t wanted = sane ? mul(wanted_counts, FINE) : now->goal;
-        now->goal = off ? 0 : wanted;
-    }
-    /* Down in `fade` ticks, none for as many; without that policy `fade` is 0. */
-    const uint32_t start = now->fade * 2u, left = now->fading > 0u ? now->fading - 1u : 0u;
-    now->fading = late ? start : left;
+    const bool keep = !sane || now->mode == FXT_HOLD || (late && now->hold_late != 0u);
+    const int32_t wanted = keep ? now->goal : mul(wanted_counts, FINE);
+    /* Whatever is to be kept. */
+    now->goal = off ? 0 : wanted;
+    /* Down in `fade` ticks, late or not, and none for as many, with each late one anew; without that policy `fade` is 0. */
+    const uint32_t left = now->fading > 0u ? now->fading - 1u : 0u, least = late ? now->fade : 0u, start = now->fading > 0u ? 0u : least;
+    now->fading = (left > least ? left : least) + start;
     const uint32_t above = now->fading > now->fade ? now->fading - now->fade : 0u;
     return now->fading > 0u ? part_of(now->goal, (float)above * now->fade_step) : now->goal;
 }

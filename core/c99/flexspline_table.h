@@ -11,7 +11,7 @@
  *   // every tick:
  *   fxt_step(&table, &play, measured, target, torque_n_m, temperature_c, &now, &command);
  *   // now.output: where the output is; command.generator: where the generator has to go, if command.quality is not FXT_DISABLED
- *   // in the background, a page at a time: is the memory of the table still what fxt_open checked? nothing else finds that out
+ *   // in the background, a page at a time: are the image and the fxt_table still what fxt_open left? nothing else finds all of that out
  *   if (!fxt_page_intact(&table, page++ % fxt_page_count(&table))) stop();
  *
  * A pointer that is NULL is refused: each function says how below. A table that was refused, or is NULL, knows no ratio: all its angles are 0.
@@ -111,8 +111,8 @@ typedef enum fxt_quality {
     FXT_IN_RANGE = 0,
     FXT_UNCERTAIN,    /**< known to within the uncertainty only: inside a jump, or the side of the play is not known yet */
     FXT_EXTRAPOLATED, /**< torque or temperature outside the range of the table; the value at its edge is used */
-    FXT_DISABLED      /* no correction: an input was not finite, or a number from a changed image is beyond the limits of the table. Most
-                         changes of its memory are not seen here but by fxt_page_intact alone */
+    FXT_DISABLED      /* no correction: an input was not finite, a number from a changed image is beyond the limits of the table, or in the
+                         fxt_table the ratio or the place of the image changed. Other changes are seen by fxt_page_intact alone */
 } fxt_quality;
 
 /** A direction of motion of the output. */
@@ -121,23 +121,21 @@ typedef enum fxt_direction { FXT_FORWARD = 0, FXT_BACKWARD } fxt_direction;
 /** A ratio of tooth counts: a whole part and 64 fractional bits. */
 typedef struct fxt_factor {
     uint64_t fraction;
-    uint32_t whole;
+    uint32_t whole, zero; /* no padding */
 } fxt_factor;
 
 /** Periods in an output turn: 32 whole and 32 fractional bits, and 32 more. */
 typedef struct fxt_rate {
     uint64_t periods;
-    uint32_t rest;
+    uint32_t rest, zero; /* no padding */
 } fxt_rate;
 
 /** A table that passed every check. Made by fxt_open alone; its fields are nobody else's. The image must stay where it is. */
 typedef struct fxt_table {
-    const uint8_t *image;
-    uint32_t bytes, body_bytes;
     fxt_factor to_output, to_generator;
     fxt_rate generator_rate, tooth_rate;
-    uint32_t ripple_order;
-    bool reversed;
+    uint32_t bytes, body_bytes;
+    uint32_t ripple_order, reversed;
     float cell_width;
     int32_t ripple_cells, limit, hold;
     uint32_t ripple_nodes, ripple_unit, iterations;
@@ -145,6 +143,9 @@ typedef struct fxt_table {
     /* Bounds found while the image was checked: error rad, of the periodic parts rad, slope, of the curves, cells, rounding rad. */
     float bounds[6];
     float inverse_error_rad;
+    uint32_t ratio_sum; /* of what turns counts of one shaft into counts of the other; each call looks at it */
+    uint32_t sum;       /* CRC-32 of all above, which has no padding; the image stands here twice instead */
+    const uint8_t *image, *again;
 } fxt_table;
 
 /** What a table is for. */
@@ -194,8 +195,10 @@ const char *fxt_reason_name(fxt_reason reason);
 const char *fxt_field_name(fxt_field field);
 /** What the table is for; all zero for one that was refused. */
 fxt_info fxt_tell(const fxt_table *table);
-/** Whether one page of 256 bytes of the image still matches its checksum, and how many there are. The only function that sees that the memory
- * changed after fxt_open: a step with a changed table is wrong by some two error limits at most, in any quality. */
+/** Whether the fxt_table is what fxt_open left, and one page of 256 bytes of the image still matches its checksum; and how many pages there are:
+ * one, which is not intact, where the fxt_table changed, was refused or is NULL. The only function that sees each change: a step with a changed image
+ * or fxt_table is wrong by some two error limits at most, in any quality. Where more would be, as the ratio or the place of the image in the
+ * fxt_table changed, each function takes it as refused. */
 bool fxt_page_intact(const fxt_table *table, uint32_t page);
 uint32_t fxt_page_count(const fxt_table *table);
 
@@ -249,15 +252,16 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
 typedef enum fxt_mode {
     FXT_OFF = 0,  /**< none: it is taken back within the limits. The start */
     FXT_TRACKING, /**< it follows the table */
-    FXT_HOLD,     /**< it stays as it is */
+    FXT_HOLD,     /**< it stays as it is: also none, after it was withdrawn as none could be made for longer than patience */
     FXT_SAFE      /**< none, and none before FXT_OFF was asked for: after a fault */
 } fxt_mode;
 
-/** What a tick that came late does to the correction. */
+/** What a tick that came late does to the correction, but in FXT_OFF and FXT_SAFE, or where none could be made for longer than patience. */
 typedef enum fxt_overrun {
     FXT_SKIP = 0,  /**< nothing more: the ticks missed are skipped */
     FXT_HOLD_LAST, /**< it stays as it is in this tick */
-    FXT_FADE_OUT   /**< it fades to none within fade_ticks, stays there as long, and comes back */
+    FXT_FADE_OUT   /**< it fades to none within fade_ticks, however many of them come late, stays there for as many after the last late one, and
+                    * comes back */
 } fxt_overrun;
 
 /** Limits of a joint, in units of its output and of seconds. */
@@ -265,8 +269,8 @@ typedef struct fxt_limits {
     float tick_s;               /**< time from tick to tick, 1e-7 to 1e3 s */
     float rate_rad_s;           /**< fastest correction: 1.8e-10 to 0.05 rad in a tick */
     float acceleration_rad_s2;  /**< largest acceleration of the correction, no less than 1.8e-10 rad in a tick more each tick; it brakes with half of that */
-    float generator_rate_rad_s; /**< fastest generator: what moves faster from tick to tick is a glitch; 1.5e-9 rad to half a turn in a tick.
-                                 * Its acceleration: fxt_joint_limit_acceleration */
+    float generator_rate_rad_s; /**< fastest generator: what moves faster from tick to tick, those missed counted, is a glitch; 1.5e-9 rad to half a
+                                 * turn in a tick. Its acceleration: fxt_joint_limit_acceleration */
     float hold_rad;             /**< a target no further from the output is reached on the flank that bears already; 0: none; 1.5e-9 to 0.05 */
     uint16_t patience;          /**< ticks for which a glitch is not believed, and the last correction kept where none can be made */
     uint16_t fade_ticks;        /**< of FXT_FADE_OUT */
@@ -349,10 +353,11 @@ fxt_mode fxt_joint_mode(const fxt_joint *joint);
 /** Which side of the play the drive rests on is not known any more, as after work on it. */
 void fxt_joint_forget_side(fxt_joint *joint);
 /** One tick: in the order of its calls the play follows the generator. The command is the target times the ratio less a correction. The correction
- * moves within rate and acceleration, and stays within the error limit of the table (times 1.001, and 16 counts), whatever comes in. The target is
- * taken as it is: where it leaps the command leaps, without a flag, so its rate is yours to limit. Without a joint, a table or an input
- * (FXT_NO_JOINT_OR_TABLE) the command is the sample of the input, not judged; without one the last that was believed; 0 if there was none: do not
- * follow it. It does not see that the memory of the table changed: fxt_page_intact. */
+ * moves within rate and acceleration, and stays within the error limit of the table (times 1.001, and 16 counts), whatever the input is: but at
+ * that limit it stops at once, and after a table of a larger limit it first comes back. The target is taken as it is: where it leaps the command
+ * leaps, without a flag, so its rate is yours to limit. Without a joint, a table or an input (FXT_NO_JOINT_OR_TABLE) the command is the sample of
+ * the input, not judged; without one the last that was believed; 0 if there was none: do not follow it. It does not see each change of the memory
+ * of the table (fxt_page_intact), and none of that of the joint. */
 fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *input);
 
 /** An encoder and where it is, one for each axis: from its register to an angle and back, as the core's; nothing drifts, also where the counts in a turn are no power
@@ -376,9 +381,10 @@ bool fxt_encoder_start(fxt_encoder *encoder, uint64_t reading, int64_t near_coun
  * that the tick does not believe (FXT_GLITCH) moves no turn: one that is further from the one before than a tick allows is taken from the angle
  * that was believed last, for N ticks; in N + 2 the generator cannot make half of what the register counts. So the turns are right as soon as the
  * readings are, if no more than N - 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at 500 rad/s. After
- * more the encoder is lost (fxt_encoder_is_lost): call fxt_encoder_start with what is known otherwise. False, and nothing else changes: the
- * encoder is lost; the register cannot read that; there is no joint or no encoder; or generator_rate_rad_s allows a sixth of what the register
- * counts in a tick, so that motion hides a wrong bit. Give the tick no sample then. */
+ * more the encoder is lost (fxt_encoder_is_lost): call fxt_encoder_start with what is known otherwise. A tick that is missed counts as one of the
+ * N at this call, as two at later ones. False, and nothing else changes: the encoder is lost; the register cannot read that; there is no joint or
+ * no encoder; or generator_rate_rad_s allows a sixth of what the register counts in a tick, so that motion hides a wrong bit. Give the tick no
+ * sample then. */
 bool fxt_joint_read(const fxt_joint *joint, fxt_encoder *encoder, uint64_t reading, int64_t *angle);
 /** Whether nothing shows any more which turn the encoder is in, or it is none: start it anew. */
 bool fxt_encoder_is_lost(const fxt_encoder *encoder);

@@ -478,6 +478,101 @@ static int wrong_bits(void)
     return 0;
 }
 
+/* Ticks with the torque, late or not, of a joint that moves on: the last of them. */
+static fxt_output ticks(const fxt_table *table, fxt_joint *joint, int number, float torque_n_m, bool late)
+{
+    fxt_output out = {0};
+    for (int tick = 0; tick < number; tick++) {
+        const int64_t generator = joint->generator + (1 << 20);
+        const fxt_input input = {generator, generator / 95, torque_n_m, 20.0f, late ? 1 : 0, true};
+        out = fxt_tick(table, joint, &input);
+    }
+    return out;
+}
+
+/* However many ticks come late: off, safe and a torque that is lost for good leave no correction, and a fade ends. What is late may be as far away as
+ * the ticks since the last one allow. */
+static int late_ticks(void)
+{
+    const made of = plain();
+    fxt_table table;
+    fxt_joint joint;
+    EXPECT(fxt_open(&table, of.image, of.bytes).reason == FXT_OK);
+    for (int i = 0; i < 3 * 2 * 2 * 3; i++) {
+        fxt_limits limits = usual;
+        const bool late = i / 3 % 2 == 1, holds = i / 6 % 2 == 1, lost = i / 12 == 2;
+        limits.overrun = (fxt_overrun)(i % 3);
+        limits.fade_ticks = 10;
+        EXPECT(fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK && fxt_joint_request(&joint, FXT_TRACKING));
+        const fxt_output before = ticks(&table, &joint, 400, 8.0f, false);
+        EXPECT(fabsf(before.correction_rad) > 4e-5f && before.flags == 0u);
+        EXPECT(!holds || fxt_joint_request(&joint, FXT_HOLD));
+        EXPECT(lost || fxt_joint_request(&joint, i / 12 == 0 ? FXT_OFF : FXT_SAFE));
+        /* Kept for as long as patience lasts. */
+        const fxt_output kept = ticks(&table, &joint, 5, lost ? NAN : 8.0f, late);
+        EXPECT(!lost || kept.correction_rad == before.correction_rad || (late && limits.overrun == FXT_FADE_OUT));
+        const fxt_output out = ticks(&table, &joint, 100, lost ? NAN : 8.0f, late);
+        EXPECT(out.correction_rad == 0.0f && (lost || (out.flags & FXT_HELD_BACK) != 0u));
+    }
+    /* Late in each tick: down within the fade, none, and back after it. Late once while there is none: as long once more. */
+    fxt_limits limits = usual;
+    limits.overrun = FXT_FADE_OUT;
+    limits.fade_ticks = 100;
+    EXPECT(fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK && fxt_joint_request(&joint, FXT_TRACKING));
+    const fxt_output before = ticks(&table, &joint, 400, 8.0f, false);
+    EXPECT(fabsf(ticks(&table, &joint, 50, 8.0f, true).correction_rad) < 0.6f * fabsf(before.correction_rad) && joint.fading == 151u);
+    for (int i = 0; i < 200; i++)
+        EXPECT(ticks(&table, &joint, 1, 8.0f, true).correction_rad == 0.0f || i < 70);
+    EXPECT(ticks(&table, &joint, 99, 8.0f, false).correction_rad == 0.0f && joint.fading == 1u && joint.goal != 0);
+    EXPECT(ticks(&table, &joint, 1, 8.0f, true).correction_rad == 0.0f && joint.fading == 100u);
+    EXPECT(ticks(&table, &joint, 200, 8.0f, false).flags == 0u && joint.fading == 0u);
+    /* On either side of what may be; a wrong one counts for more of the turns that an encoder can lose. */
+    for (uint32_t missed = 0; missed <= UINT16_MAX; missed = missed * 5u + 1u) {
+        for (int64_t more = 0; more < 2; more++) {
+            EXPECT(fxt_joint_init(&joint, &usual) == FXT_LIMITS_OK);
+            (void)ticks(&table, &joint, 3, 8.0f, false);
+            EXPECT(joint.unseen == 0u);
+            const int64_t way = (int64_t)joint.largest_move * (int64_t)(missed + 1u) + more;
+            const fxt_input input = {joint.generator + way, 0, 8.0f, 20.0f, (uint16_t)missed, true};
+            const fxt_output out = fxt_tick(&table, &joint, &input);
+            EXPECT(((out.flags & FXT_GLITCH) != 0u) == (more == 1));
+            EXPECT(joint.unseen == (missed < 32767u ? 2u * missed + 1u : UINT16_MAX) || (missed == 0u && more == 0));
+        }
+    }
+    return 0;
+}
+
+/* The memory of a fxt_table, each bit of which changes: no page of it is intact, nothing is read beyond the image, and where a ratio changed nothing is
+ * commanded. */
+static int changed_table(void)
+{
+    /* In memory of its own, so that a sanitizer sees a reading beyond its end. */
+    static uint8_t *image;
+    const made of = plain();
+    fxt_table table, other;
+    image = malloc(of.bytes);
+    EXPECT(image != NULL);
+    memcpy(image, of.image, of.bytes);
+    EXPECT(fxt_open(&table, image, of.bytes).reason == FXT_OK);
+    for (size_t bit = 0; bit < 8u * sizeof table; bit++) {
+        fxt_joint joint;
+        other = table;
+        ((uint8_t *)&other)[bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+        /* No field changed: it lies between those at the end. */
+        if (memcmp(&other, &table, offsetof(fxt_table, sum)) == 0 && other.sum == table.sum && other.image == table.image && other.again == table.again)
+            continue;
+        EXPECT(fxt_page_count(&other) == 1u && !fxt_page_intact(&other, 0));
+        EXPECT(fxt_joint_init(&joint, &usual) == FXT_LIMITS_OK && fxt_joint_request(&joint, FXT_TRACKING));
+        const fxt_output out = ticks(&other, &joint, 9, 8.0f, false);
+        const bool bounded = llabs(joint.generator - out.command) < INT64_C(95) * 2 * table.limit;
+        EXPECT((out.flags & FXT_NO_JOINT_OR_TABLE) != 0u || bounded);
+    }
+    EXPECT(fxt_page_intact(&table, 0) && fxt_page_count(&table) == 3u && !fxt_page_intact(&table, 3));
+    EXPECT(fxt_page_count(NULL) == 1u && fxt_open(&other, image, 600).reason == FXT_LENGTH && fxt_page_count(&other) == 1u);
+    free(image);
+    return 0;
+}
+
 /* A joint that follows a steady way, with one sample that is out: output and flags of a tick. */
 static fxt_output steady(const fxt_table *table, fxt_joint *joint, int64_t tick, int64_t step, int64_t out)
 {
@@ -667,7 +762,8 @@ static int radians(void)
 
 int main(void)
 {
-    const int wrong = images() + arithmetic() + plays() + changed() + joints() + wrong_bits() + outliers() + wrong_in_a_row() + encoders() + radians();
-    printf("%d of 10 groups of edges are wrong\n", wrong);
+    int wrong = images() + arithmetic() + plays() + changed() + changed_table() + joints() + late_ticks();
+    wrong += wrong_bits() + outliers() + wrong_in_a_row() + encoders() + radians();
+    printf("%d of 12 groups of edges are wrong\n", wrong);
     return wrong != 0;
 }

@@ -286,18 +286,22 @@ void goal_follows_the_mode(void)
     fxt_joint joint = any_joint(size);
     const int32_t before = joint.goal, wanted = nondet_int();
     __ESBMC_assume(before >= -size && before <= size && wanted >= -MOST_LIMIT && wanted <= MOST_LIMIT);
-    /* No fade. */
-    joint.fade = 0u;
-    joint.fading = 0u;
+    /* As fxt_joint_init leaves it, and a tick. */
+    joint.fade_step = joint.fade > 0u ? 1.0f / (float)joint.fade : 0.0f;
+    const uint32_t fading = joint.fading, fade = joint.fade;
+    __ESBMC_assume(fading <= 2u * fade);
     const bool late = nondet_bool(), sane = nondet_bool();
     const int32_t goal = goal_of(&joint, late, wanted, sane);
-    if (joint.mode == FXT_HOLD || (late && joint.hold_late != 0u)) {
-        PROMISE(goal == before);
-    } else if (joint.mode == FXT_TRACKING && joint.uncorrected <= joint.patience) {
-        PROMISE(goal == (sane ? wanted * FINE : before));
+    if (joint.mode == FXT_OFF || joint.mode == FXT_SAFE || joint.uncorrected > joint.patience) {
+        PROMISE(joint.goal == 0 && goal == 0);
+    } else if (joint.mode == FXT_HOLD || (late && joint.hold_late != 0u)) {
+        PROMISE(joint.goal == before);
     } else {
-        PROMISE(goal == 0);
+        PROMISE(joint.goal == (sane ? wanted * FINE : before));
     }
+    PROMISE(joint.fading > 0u ? joint.fading > fade || goal == 0 : goal == joint.goal);
+    /* A late tick begins a fade, but no new one while the correction is on its way down; where there is none it stays so. */
+    PROMISE(joint.fading == (fading > fade ? fading - 1u : late ? (fading == 0u ? 2u * fade : fade) : fading > 0u ? fading - 1u : 0u));
     PROMISE(!sane || joint.uncorrected == 0u);
     END;
 }
@@ -312,7 +316,8 @@ void a_sample_moves_no_further_than_a_tick_allows_or_is_doubted(void)
     input.missed_ticks = (uint16_t)nondet_uint();
     const judged is = judge(&joint, &input, nondet_int());
     const int64_t way = minus(joint.generator, before.generator);
-    PROMISE((way >= -(int64_t)before.largest_move && way <= before.largest_move) || is.forgotten || is.back || before.sampled == 0u);
+    const uint64_t most = (uint64_t)(uint32_t)before.largest_move * (input.missed_ticks + 1u);
+    PROMISE(size_of(way) <= most || before.glitches >= before.patience || is.back || before.sampled == 0u);
     PROMISE(joint.generator == before.generator || (input.has_generator && joint.generator == input.generator));
     PROMISE(joint.glitches <= joint.patience && (!is.good || joint.sampled != 0u) && is.good == (input.has_generator && !is.glitch));
     /* Only after three in a row that were believed, and within a turn, is the one before taken back. */

@@ -484,9 +484,11 @@ impl JointSettings {
         // Zero where the way fits 32 bits.
         let wide = (way >> 32) as i32 ^ all(step);
         let wide = wide | wide.wrapping_neg();
-        // Outside ± the largest move. Without one that was saved the first is believed wherever it is.
+        // Outside ± the largest move in each tick since the last, which fits 48 bits. Without one that was saved the
+        // first is believed wherever it is.
         let was_seen = (seen as i32).wrapping_neg();
-        let far = (self.largest_move.wrapping_sub(step.wrapping_abs()) | wide) & was_seen;
+        let most = (self.largest_move as u64).wrapping_mul((input.missed_ticks as u64).wrapping_add(1));
+        let far = (most.wrapping_sub(way.unsigned_abs()) >> 32) as i32 & was_seen;
         // The way of a tick that came late is that of several.
         let on_time = all((input.missed_ticks as i32).wrapping_sub(1));
         let in_a_row = (now.marks & IN_A_ROW) as i32 & on_time;
@@ -513,9 +515,10 @@ impl JointSettings {
         let flank = (now.marks ^ now.marks >> FLANK_SHIFT) & FLANK & back as u32;
         // One more in a row; one in which a new place is believed has no way.
         let row = ((in_a_row as u32) << 1 | FIRST_IN_A_ROW) & IN_A_ROW & (good & !believed) as u32;
-        // One or two may each look like motion and be wrong.
+        // One or two may each look like motion and be wrong, in a late tick by the way of as many more.
         let settled = all((row as i32) << BEND_TO_SIGN) as u32;
-        let unseen = (now.marks & UNSEEN).saturating_add(1 << UNSEEN_SHIFT) & UNSEEN & !settled;
+        let more = (input.missed_ticks as u32).wrapping_mul(2).wrapping_add(1).saturating_mul(1 << UNSEEN_SHIFT);
+        let unseen = (now.marks & UNSEEN).saturating_add(more) & UNSEEN & !settled;
         let rest = now.marks & !(SEEN | IN_A_ROW | UNSEEN);
         now.marks = (rest ^ flank) | seen_now | row | unseen;
         let half_way = (step >> 1).wrapping_add(samples.step >> 1);
@@ -537,18 +540,18 @@ impl JointSettings {
     fn goal(&self, now: &mut Kept, input: &Input, wanted: i32, sane: bool) -> (i32, bool) {
         let late = input.missed_ticks > 0;
         now.uncorrected = now.uncorrected.saturating_add(1).wrapping_mul(!sane as u16);
-        let kept = now.goal;
-        let wanted = if sane { wanted.wrapping_mul(FINE) } else { kept };
         let mode = now.marks & MODE;
         // Off or safe: the two bits are the same.
         let off = (now.uncorrected > self.debounce_ticks) | ((mode ^ (mode >> 1)) & 1 == 0);
-        let keep = (mode == Mode::Hold.code()) | (late & (self.hold_late != 0));
+        let keep = !sane | (mode == Mode::Hold.code()) | (late & (self.hold_late != 0));
+        let wanted = if keep { now.goal } else { wanted.wrapping_mul(FINE) };
+        // Whatever is to be kept.
         let wanted = if off { 0 } else { wanted };
-        let wanted = if keep { kept } else { wanted };
-        // Down in `fade` ticks, none for as many; without that policy `fade` is 0.
-        let start = (self.fade as u32).wrapping_mul(2);
-        let left = now.fading.saturating_sub(1);
-        now.fading = left ^ (left ^ start) & (late as u32).wrapping_neg();
+        // Down in `fade` ticks, late or not, and none for as many, with each late one anew; without that policy `fade`
+        // is 0.
+        let least = self.fade as u32 & (late as u32).wrapping_neg();
+        let start = if now.fading > 0 { 0 } else { least };
+        now.fading = now.fading.saturating_sub(1).max(least).wrapping_add(start);
         let part = now.fading.saturating_sub(self.fade as u32) as f32 * self.fade_step;
         let faded = (wanted as f32 * part) as i32;
         let goal = if now.fading > 0 { faded } else { wanted };
@@ -1162,6 +1165,89 @@ mod tests {
         assert!(corrections[410..790].iter().all(|&c| c == 0.0), "{:?}", &corrections[405..420]);
         assert!(corrections[1300] > 0.9 * corrections[0]);
         assert_eq!(fade.state.missed_ticks(), 3);
+    }
+
+    const POLICIES: [Overrun; 3] = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 40 }];
+
+    /// However many ticks come late: off, safe and a torque that is lost for good leave no correction.
+    #[test]
+    fn what_ends_the_correction_ends_it_in_late_ticks_too() {
+        for (policy, missed_ticks, hold) in
+            POLICIES.into_iter().flat_map(|policy| [(policy, 0, false), (policy, 0, true), (policy, 1, false)])
+        {
+            for (mode, torque_n_m) in [(Mode::Off, 5.0), (Mode::Safe, 5.0), (Mode::Tracking, f32::NAN)] {
+                let mut run = Loop::new(policy);
+                let before = run.run(300, 1e-3, 1e-5);
+                assert!(before.correction_rad.abs() > 1e-5);
+                if hold {
+                    run.state.request(Mode::Hold).unwrap();
+                }
+                if mode != Mode::Tracking {
+                    run.state.request(mode).unwrap();
+                }
+                let mut out = before;
+                for tick in 0..300 {
+                    out = run.tick(&Input { torque_n_m, missed_ticks, ..run.input(4e-3) });
+                    run.generator = out.command;
+                    // A lost torque is borne for five ticks.
+                    let kept = mode == Mode::Tracking && tick < 5 && policy != POLICIES[2];
+                    assert!(!kept || (out.correction_rad - before.correction_rad).abs() < COUNT, "{policy:?} {tick}");
+                }
+                assert_eq!(out.correction_rad, 0.0, "{policy:?} {missed_ticks} {hold} {mode:?}");
+                assert_eq!(out.flags.contains(Flags::HELD_BACK), torque_n_m.is_finite(), "{policy:?} {mode:?}");
+            }
+        }
+    }
+
+    /// Ticks late in every one, in every second one, and in bursts: none within its time, as long as they come late,
+    /// and back afterwards.
+    #[test]
+    fn a_fade_goes_on_in_late_ticks() {
+        let late: [fn(usize) -> bool; 4] = [|_| true, |tick| tick % 2 == 0, |tick| tick % 40 == 0, |tick| tick % 7 < 3];
+        for late in late {
+            let mut run = Loop::new(POLICIES[2]);
+            let before = run.run(300, 1e-3, 1e-5).correction_rad.abs();
+            for tick in 0..600 {
+                let missed_ticks = u16::from(late(tick));
+                let out = run.tick(&Input { missed_ticks, ..run.input(4e-3) });
+                run.generator = out.command;
+                // The limiter takes its time after the fade.
+                assert!(tick < 70 || out.correction_rad == 0.0, "{tick}: {out:?}");
+                assert!(tick < 1 || out.flags.contains(Flags::HELD_BACK), "{tick}: {out:?}");
+            }
+            let back = run.run(300, 4e-3, 0.0);
+            assert!(back.correction_rad.abs() > 0.5 * before && back.held_back_rad.abs() < COUNT, "{back:?}");
+        }
+    }
+
+    /// As far away as the ticks since the last one allow, however many those are, and no further.
+    #[test]
+    fn a_late_sample_may_be_as_far_away_as_its_ticks_allow() {
+        let in_a_tick = f64::from(LIMITS.generator_rate_rad_s) * f64::from(LIMITS.tick_s);
+        for missed_ticks in [0u16, 1, 2, 7, 100, u16::MAX] {
+            for share in [-1.001, -0.999, 0.999, 1.001] {
+                let mut run = Loop::new(Overrun::SkipAndCount);
+                let _ = run.tick(&run.input(0.0));
+                let way_rad = share * in_a_tick * (f64::from(missed_ticks) + 1.0);
+                let input = Input { generator: GeneratorAngle::from_rad(way_rad), missed_ticks, ..run.input(0.0) };
+                let glitch = run.tick(&input).flags.contains(Flags::GLITCH);
+                assert_eq!(glitch, share.abs() > 1.0, "{missed_ticks} missed, {share}");
+            }
+        }
+    }
+
+    /// A tick is missed at 60 % of the largest speed: the side of the play is known as before.
+    #[test]
+    fn one_missed_tick_at_speed_costs_nothing() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let mut at = 0.0;
+        for tick in 0..40 {
+            let missed_ticks = u16::from(tick == 20);
+            at += 0.42 * (f64::from(missed_ticks) + 1.0);
+            let input = Input { generator: GeneratorAngle::from_rad(at), missed_ticks, ..run.input(at / 95.0) };
+            let out = run.joint.tick(&images(), &mut run.store, &mut run.state, &input);
+            assert!(!out.flags.contains(Flags::GLITCH) && (tick < 3 || run.state.play().is_known()), "{tick}: {out:?}");
+        }
     }
 
     #[test]

@@ -360,7 +360,7 @@ impl<W: Write> Vectors<W> {
         let torques: Vec<f32> = table.torque_nodes_n_m().collect();
         let modes = [Mode::Off, Mode::Tracking, Mode::Hold, Mode::Safe];
         let mut state = JointState::new();
-        let (mut torque, mut target, mut speed) = (0.0, mixed.number() as i64 >> 20, 0i64);
+        let (mut torque, mut target, mut speed, mut late) = (0.0, mixed.number() as i64 >> 20, 0i64, false);
         let mut generator = table.drive().nominal_generator(OutputAngle::from_counts(target)).counts();
         let encoder = self.settings(mixed)?;
         let mut at: Option<EncoderState> = None;
@@ -370,6 +370,8 @@ impl<W: Write> Vectors<W> {
                 let bytes = mixed.bytes(64);
                 torque = tables::hostile_axis(&mut Choices::new(&bytes), &torques);
                 speed = (mixed.number() as i64) >> (40 + mixed.number() % 24);
+                // For a while every tick comes late.
+                late = number >> 7 & 7 == 0;
             }
             target = target.wrapping_add(speed);
             if number.is_multiple_of(2053) {
@@ -395,7 +397,8 @@ impl<W: Write> Vectors<W> {
             let glitch = if number >> 48 & 63 == 0 { (mixed.number() as i64) >> 20 } else { 0 };
             let sample = generator.wrapping_add(noise).wrapping_add(glitch);
             let has_generator = number >> 54 & 15 != 0;
-            let missed_ticks = if number >> 58 == 0 { (mixed.number() & 3) as u16 } else { 0 };
+            let some = if number >> 58 == 0 { (mixed.number() & 3) as u16 } else { 0 };
+            let missed_ticks = if late { some.max(1) } else { some };
             let input = Input {
                 generator: has_generator.then_some(GeneratorAngle::from_counts(sample)),
                 target: OutputAngle::from_counts(target),
