@@ -488,8 +488,8 @@ impl JointSettings {
         // Outside ± the largest move in each tick since the last, which fits 48 bits. Without one that was saved the
         // first is believed wherever it is.
         let was_seen = (seen as i32).wrapping_neg();
-        let most = (self.largest_move as u64).wrapping_mul((input.missed_ticks as u64).wrapping_add(1)) as i64;
-        let far = ((most.wrapping_sub(way) | most.wrapping_add(way)) >> 32) as i32 & was_seen;
+        let most = (self.largest_move as u32 as u64).wrapping_mul((input.missed_ticks as u64).wrapping_add(1));
+        let far = (most.wrapping_sub(way.unsigned_abs()) >> 32) as i32 & was_seen;
         // The way of a tick that came late is that of several.
         let on_time = all((input.missed_ticks as i32).wrapping_sub(1));
         let in_a_row = (now.marks & IN_A_ROW) as i32 & on_time;
@@ -542,18 +542,19 @@ impl JointSettings {
     fn goal(&self, now: &mut Kept, input: &Input, wanted: i32, sane: bool) -> (i32, bool) {
         let late = input.missed_ticks > 0;
         now.uncorrected = now.uncorrected.saturating_add(1).wrapping_mul(!sane as u16);
+        let kept = now.goal;
+        let wanted = if sane { wanted.wrapping_mul(FINE) } else { kept };
         let mode = now.marks & MODE;
-        // Off or safe: the two bits are the same.
+        // Off or safe: the two bits are the same. Of hold and safe the upper one is set.
         let off = (now.uncorrected > self.debounce_ticks) | ((mode ^ (mode >> 1)) & 1 == 0);
-        let keep = !sane | (mode == Mode::Hold.code()) | (late & (self.hold_late != 0));
-        let wanted = if keep { now.goal } else { wanted.wrapping_mul(FINE) };
-        // Whatever is to be kept.
-        let wanted = if off { 0 } else { wanted };
+        let late_mask = (late as u32).wrapping_neg();
+        let keep = (mode >> 1).wrapping_neg() | (late_mask & self.hold_late);
+        let wanted = if off { 0 } else { wanted ^ (wanted ^ kept) & keep as i32 };
         // Down in `fade` ticks, late or not, and none for as many, with each late one anew; without that policy `fade`
         // is 0.
-        let least = self.fade as u32 & (late as u32).wrapping_neg();
-        let least = least << (now.fading == 0) as u32;
-        now.fading = now.fading.saturating_sub(1).max(least);
+        let left = now.fading.saturating_sub(1);
+        let start = left.max((self.fade as u32) << (now.fading == 0) as u32);
+        now.fading = left ^ (left ^ start) & late_mask;
         let part = now.fading.saturating_sub(self.fade as u32) as f32 * self.fade_step;
         let faded = (wanted as f32 * part) as i32;
         let goal = if now.fading > 0 { faded } else { wanted };
