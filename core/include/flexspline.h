@@ -207,7 +207,7 @@
 // The correction follows the table.
 #define FLEXSPLINE_MODE_TRACKING 1
 
-// The correction stays as it is.
+// The correction stays as it is; withdrawn where none could be made for `debounce_ticks`, it stays so.
 #define FLEXSPLINE_MODE_HOLD 2
 
 // No correction, and none before off was asked for: after a fault.
@@ -243,10 +243,10 @@
 // A tick that came late: the ticks missed are counted, nothing more.
 #define FLEXSPLINE_OVERRUN_SKIP 0
 
-// The correction stays as it is in that tick.
+// The correction stays as it is in that tick, in tracking and hold, and where some can be made.
 #define FLEXSPLINE_OVERRUN_HOLD 1
 
-// The correction fades out within `fade_ticks`, stays there as long, and comes back.
+// The correction fades out within `fade_ticks`, stays there for as many after the last late tick, and comes back.
 #define FLEXSPLINE_OVERRUN_FADE 2
 
 // The flexspline is fixed, the circular spline is the output.
@@ -406,7 +406,7 @@ typedef struct FlexsplineSettings {
   float rate_rad_s;
   // Largest acceleration of the correction, rad/s^2.
   float acceleration_rad_s2;
-  // Fastest generator, rad/s.
+  // Fastest generator, rad/s, also in ticks that were missed.
   float generator_rate_rad_s;
   // A target no further from the output than this is reached on the flank that bears already, rad; 0 for none. Three
   // times the peak of the encoder's noise at the output keeps the flank from changing to and fro; it costs up to
@@ -1249,7 +1249,8 @@ enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder
 // in N + 2 the generator cannot make half of what the register counts. So the turns are right as soon as the readings
 // are, if no more than N - 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at
 // 500 rad/s. After more the encoder is lost: give the tick no sample, and call `flexspline_encoder_start` with what is
-// known otherwise. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no
+// known otherwise. A tick that is missed counts as one of the N at this call, as two at later ones.
+// `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no
 // sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
 // hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint
 // are lost.

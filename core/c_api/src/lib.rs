@@ -200,7 +200,7 @@ pub struct FlexsplineSettings {
     pub rate_rad_s: f32,
     /// Largest acceleration of the correction, rad/s^2.
     pub acceleration_rad_s2: f32,
-    /// Fastest generator, rad/s.
+    /// Fastest generator, rad/s, also in ticks that were missed.
     pub generator_rate_rad_s: f32,
     /// A target no further from the output than this is reached on the flank that bears already, rad; 0 for none. Three
     /// times the peak of the encoder's noise at the output keeps the flank from changing to and fro; it costs up to

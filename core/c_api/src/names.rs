@@ -16,7 +16,7 @@ pub const FLEXSPLINE_VERSION_NUMBER: u32 = 100;
 pub const FLEXSPLINE_MODE_OFF: u8 = 0;
 /// The correction follows the table.
 pub const FLEXSPLINE_MODE_TRACKING: u8 = 1;
-/// The correction stays as it is.
+/// The correction stays as it is; withdrawn where none could be made for `debounce_ticks`, it stays so.
 pub const FLEXSPLINE_MODE_HOLD: u8 = 2;
 /// No correction, and none before off was asked for: after a fault.
 pub const FLEXSPLINE_MODE_SAFE: u8 = 3;
@@ -43,9 +43,9 @@ pub const FLEXSPLINE_HEALTH_TORN: u8 = 4;
 
 /// A tick that came late: the ticks missed are counted, nothing more.
 pub const FLEXSPLINE_OVERRUN_SKIP: u8 = 0;
-/// The correction stays as it is in that tick.
+/// The correction stays as it is in that tick, in tracking and hold, and where some can be made.
 pub const FLEXSPLINE_OVERRUN_HOLD: u8 = 1;
-/// The correction fades out within `fade_ticks`, stays there as long, and comes back.
+/// The correction fades out within `fade_ticks`, stays there for as many after the last late tick, and comes back.
 pub const FLEXSPLINE_OVERRUN_FADE: u8 = 2;
 
 /// The flexspline is fixed, the circular spline is the output.

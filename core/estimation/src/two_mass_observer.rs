@@ -403,10 +403,11 @@ impl TwoMassObserver {
     /// Whether the model is lost to an upset that cannot be mended.
     #[must_use]
     pub fn is_lost(&self) -> bool {
-        self.model().is_none()
+        self.step.open().is_none() || self.ahead.open().is_none()
     }
 
     /// The whole model; `None` where a part of it is lost.
+    #[inline(never)]
     fn model(&self) -> Option<TwoMassModel> {
         let (StepModel { a, b, gain }, AheadModel { turn, turn_push, stiffness }) =
             (self.step.open()?, self.ahead.open()?);
@@ -580,7 +581,7 @@ impl TwoMassObserver {
             bound_rad: f32::INFINITY,
             quality: Quality::Disabled,
         };
-        let (Some(TwoMassModel { stiffness, .. }), Some(Estimated(x))) = (self.model(), state.x.open()) else {
+        let (Some(AheadModel { stiffness, .. }), Some(Estimated(x))) = (self.ahead.open(), state.x.open()) else {
             return unknown;
         };
         let measured_sound = now.measured.is_none() || now.measured_bound_rad.is_finite();

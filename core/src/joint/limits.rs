@@ -33,7 +33,8 @@ pub struct Limits {
     pub rate_rad_s: f32,
     /// Largest acceleration of the correction at the output, rad/s²; it brakes with half of that.
     pub acceleration_rad_s2: f32,
-    /// Fastest generator, rad/s: what moves faster from tick to tick is a glitch. Its acceleration is limited by
+    /// Fastest generator, rad/s: what moves faster from tick to tick, those missed counted, is a glitch. Its
+    /// acceleration is limited by
     /// [`Joint::with_generator_acceleration`](crate::Joint::with_generator_acceleration).
     pub generator_rate_rad_s: f32,
     /// Ticks for which a glitch is not believed, and for which the last correction is kept where none can be made.

@@ -9,7 +9,7 @@ pub enum Mode {
     Off,
     /// The correction follows the table.
     Tracking,
-    /// The correction stays as it is.
+    /// The correction stays as it is; withdrawn where none could be made for `debounce_ticks`, it stays so.
     Hold,
     /// No correction, and none before [`Mode::Off`] was asked for: after a fault.
     Safe,
@@ -63,14 +63,16 @@ impl Mode {
     }
 }
 
-/// Effect of a late tick on the correction. Missed ticks are counted with each.
+/// Effect of a late tick on the correction in tracking and hold, where some can be made. Missed ticks are counted with
+/// each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overrun {
     /// Nothing more: the ticks missed are skipped.
     SkipAndCount,
     /// The correction stays as it is in this tick.
     HoldLast,
-    /// The correction fades to none within this number of ticks, stays there as long, and comes back.
+    /// The correction fades to none within this number of ticks, however many come late, stays there for as many after
+    /// the last late one, and comes back.
     FadeOut {
         /// Ticks, at least 1.
         ticks: u16,

@@ -11,12 +11,12 @@
 //! | no sample | keeps the last angle and the play; the error is known to the table's limit | [`Flags::SAMPLE_LOST`] |
 //! | a sample too far off | ignores it; accepts it after `debounce_ticks`, play side unknown | [`Flags::GLITCH`] |
 //! | a sample out and back | takes back what it did to the play in the next tick, however far | [`Flags::GLITCH`] |
-//! | input not finite, table in doubt | keeps it for `debounce_ticks`, then fades it out | [`Flags::NOT_CORRECTED`] |
+//! | input not finite, table in doubt | keeps it for `debounce_ticks`, then withdraws it | [`Flags::NOT_CORRECTED`] |
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
 //! | an adjustment that is not known | adds its uncertainty | [`Uncertain`](crate::Quality::Uncertain) |
 //! | an adjustment that is lost | as an input that is not finite | [`Flags::NOT_CORRECTED`] |
 //! | torque or temperature out of range | uses the value at the edge | [`Extrapolated`](crate::Quality::Extrapolated) |
-//! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
+//! | a tick came late | by [`Overrun`]; the sample may be further off, by tick missed | [`Flags::OVERRUN`] |
 //! | a target that leaps | commands the leap: the correction alone is limited | |
 //! | a mode or a fade that does not follow the table | [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
 //! | a reversal, or another fast correction | limits the rate: [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
@@ -191,7 +191,8 @@ impl Joint {
     /// before than a tick allows is taken from the angle that was believed last, for N ticks; in N + 2 the generator
     /// cannot make half of what the register counts. So the turns are right as soon as the readings are, if no more
     /// than N − 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at 500 rad/s.
-    /// After more the encoder is lost ([`EncoderState::is_lost`]): start it anew from what is known otherwise.
+    /// After more the encoder is lost ([`EncoderState::is_lost`]): start it anew from what is known otherwise. A
+    /// tick that is missed counts as one of the N at this call, as two at later ones.
     ///
     /// `None`: the register cannot read that; joint or encoder are lost; or `generator_rate_rad_s` allows a sixth of
     /// what the register counts in a tick, so that motion hides a wrong bit.
@@ -487,7 +488,7 @@ impl JointSettings {
         // Outside ± the largest move in each tick since the last, which fits 48 bits. Without one that was saved the
         // first is believed wherever it is.
         let was_seen = (seen as i32).wrapping_neg();
-        let most = (self.largest_move as u64).wrapping_mul((input.missed_ticks as u64).wrapping_add(1));
+        let most = (self.largest_move as u32 as u64).wrapping_mul((input.missed_ticks as u64).wrapping_add(1));
         let far = (most.wrapping_sub(way.unsigned_abs()) >> 32) as i32 & was_seen;
         // The way of a tick that came late is that of several.
         let on_time = all((input.missed_ticks as i32).wrapping_sub(1));
@@ -517,8 +518,9 @@ impl JointSettings {
         let row = ((in_a_row as u32) << 1 | FIRST_IN_A_ROW) & IN_A_ROW & (good & !believed) as u32;
         // One or two may each look like motion and be wrong, in a late tick by the way of as many more.
         let settled = all((row as i32) << BEND_TO_SIGN) as u32;
-        let more = (input.missed_ticks as u32).wrapping_mul(2).wrapping_add(1).saturating_mul(1 << UNSEEN_SHIFT);
-        let unseen = (now.marks & UNSEEN).saturating_add(more) & UNSEEN & !settled;
+        let missed = input.missed_ticks;
+        let unseen = (now.unseen() as u16).saturating_add(1).saturating_add(missed).saturating_add(missed);
+        let unseen = (unseen as u32) << UNSEEN_SHIFT & !settled;
         let rest = now.marks & !(SEEN | IN_A_ROW | UNSEEN);
         now.marks = (rest ^ flank) | seen_now | row | unseen;
         let half_way = (step >> 1).wrapping_add(samples.step >> 1);
@@ -540,18 +542,19 @@ impl JointSettings {
     fn goal(&self, now: &mut Kept, input: &Input, wanted: i32, sane: bool) -> (i32, bool) {
         let late = input.missed_ticks > 0;
         now.uncorrected = now.uncorrected.saturating_add(1).wrapping_mul(!sane as u16);
+        let kept = now.goal;
+        let wanted = if sane { wanted.wrapping_mul(FINE) } else { kept };
         let mode = now.marks & MODE;
-        // Off or safe: the two bits are the same.
+        // Off or safe: the two bits are the same. Of hold and safe the upper one is set.
         let off = (now.uncorrected > self.debounce_ticks) | ((mode ^ (mode >> 1)) & 1 == 0);
-        let keep = !sane | (mode == Mode::Hold.code()) | (late & (self.hold_late != 0));
-        let wanted = if keep { now.goal } else { wanted.wrapping_mul(FINE) };
-        // Whatever is to be kept.
-        let wanted = if off { 0 } else { wanted };
+        let late_mask = (late as u32).wrapping_neg();
+        let keep = (mode >> 1).wrapping_neg() | (late_mask & self.hold_late);
+        let wanted = if off { 0 } else { wanted ^ (wanted ^ kept) & keep as i32 };
         // Down in `fade` ticks, late or not, and none for as many, with each late one anew; without that policy `fade`
         // is 0.
-        let least = self.fade as u32 & (late as u32).wrapping_neg();
-        let start = if now.fading > 0 { 0 } else { least };
-        now.fading = now.fading.saturating_sub(1).max(least).wrapping_add(start);
+        let left = now.fading.saturating_sub(1);
+        let start = left.max((self.fade as u32) << (now.fading == 0) as u32);
+        now.fading = left ^ (left ^ start) & late_mask;
         let part = now.fading.saturating_sub(self.fade as u32) as f32 * self.fade_step;
         let faded = (wanted as f32 * part) as i32;
         let goal = if now.fading > 0 { faded } else { wanted };
@@ -1171,7 +1174,7 @@ mod tests {
 
     /// However many ticks come late: off, safe and a torque that is lost for good leave no correction.
     #[test]
-    fn what_ends_the_correction_ends_it_in_late_ticks_too() {
+    fn an_end_is_an_end_in_late_ticks() {
         for (policy, missed_ticks, hold) in
             POLICIES.into_iter().flat_map(|policy| [(policy, 0, false), (policy, 0, true), (policy, 1, false)])
         {
@@ -1222,7 +1225,7 @@ mod tests {
 
     /// As far away as the ticks since the last one allow, however many those are, and no further.
     #[test]
-    fn a_late_sample_may_be_as_far_away_as_its_ticks_allow() {
+    fn a_late_sample_may_be_further_away() {
         let in_a_tick = f64::from(LIMITS.generator_rate_rad_s) * f64::from(LIMITS.tick_s);
         for missed_ticks in [0u16, 1, 2, 7, 100, u16::MAX] {
             for share in [-1.001, -0.999, 0.999, 1.001] {
