@@ -154,7 +154,7 @@ pub use play::{Direction, PlayState};
 pub use self_test::{SelfTestError, self_test};
 pub use store::{ActivateError, Activation, Counters, Health, Images, Progress, Store, Upload, UploadError};
 pub use table::{
-    Approach, Bounds, Command, GeneratorKind, Identity, IdentityCheck, Prediction, Quality, Table, TableId,
+    Approach, Command, GeneratorKind, Identity, IdentityCheck, Prediction, Quality, Table, TableId,
 };
 pub use unit::{Arcsec, Degrees};
 

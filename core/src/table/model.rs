@@ -605,7 +605,7 @@ mod tests {
                 // The widest play here: half the backlash of 60″ and the drag, both ways.
                 let width = 2.0 * 45.0 * ARCSEC;
                 let off = there.output.minus_rad(target).abs() as f64;
-                prop_assert!(off < table.bounds().slope as f64 * width, "{} arcsec off", off / ARCSEC);
+                prop_assert!(off < table.bounds.slope as f64 * width, "{} arcsec off", off / ARCSEC);
             }
         }
     }
