@@ -48,6 +48,7 @@ pub use model::{Approach, Command, Prediction};
 pub(crate) use model::{Estimate, TableModel, departure};
 pub(crate) use point::TorquePlace;
 pub use point::{OperatingPoint, Quality};
+pub(crate) use read::play_at;
 pub(crate) use words::{Words, blend_halves, blend_number, f32_at, halves, word_at, words_from};
 
 use crate::drive::Drive;
