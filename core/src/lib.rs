@@ -88,8 +88,7 @@
 //!
 //! # Signs and units
 //! * Angles in radians at the interface, positive counter-clockwise; torque N·m, temperature °C.
-//! * `transmission_error = actual − ideal` at the output. `command_correction = −predicted_error·ratio`
-//!   ([`Drive::corrected_command`]).
+//! * `transmission_error = actual − ideal` at the output. `command_correction = −predicted_error·ratio`.
 //! * The ratio is signed: `+cs/(cs − fs)` with the flexspline fixed, `−fs/(cs − fs)` with the circular spline fixed.
 //! * Positive load torque turns the output forward and gives positive wind-up.
 //! * A [`Direction`] is that of the output, in samples (of `flexspline-make`, a column `direction`: +1 where the

@@ -1,8 +1,8 @@
 //! What an encoder at the output says of a joint with a table: where the generator is, and what the torque is.
 //!
 //! A table has two errors at each place and torque, of steady motion forward and backward. The output rests on one of
-//! them or between, and both grow with the torque. So the ends of an interval lie on one flank each, at a torque that is
-//! an end of its interval, or a node between: a measured table may fall by a little from node to node.
+//! them or between, and both grow with the torque. So the ends of an interval lie on one flank each, at a torque that
+//! is an end of its interval, or a node between: a measured table may fall by a little from node to node.
 
 use super::adjustment::{Adjustment, bounded};
 use super::runtime::Joint;
@@ -32,8 +32,8 @@ pub struct Located {
     /// Whole turns of the generator that remain possible: 1 where it is located, 0 where it is disabled.
     pub turns: u32,
     /// `InRange`: located. `Uncertain`: more than half a turn to either side remains possible; the largest of the three
-    /// parts says why. `Extrapolated`: torque or temperature may lie beyond the table, whose edge is used. `Disabled`: a
-    /// number is not finite or a half-width below 0, or there is no table for this joint that is whole.
+    /// parts says why. `Extrapolated`: torque or temperature may lie beyond the table, whose edge is used. `Disabled`:
+    /// a number is not finite or a half-width below 0, or there is no table for this joint that is whole.
     pub quality: Quality,
 }
 
@@ -47,8 +47,8 @@ pub struct TorqueFromWindUp {
     /// It is no more, N·m; ∞ likewise.
     pub high_n_m: f32,
     /// `Uncertain`: the flank or the adjustment is not known. `Extrapolated`: the interval is open, or the temperature
-    /// lies beyond the table. `Disabled`: as in [`Located`], or the adjustment is lost, or the table has no wind-up that
-    /// the reading resolves.
+    /// lies beyond the table. `Disabled`: as in [`Located`], or the adjustment is lost, or the table has no wind-up
+    /// that the reading resolves.
     pub quality: Quality,
 }
 
@@ -59,12 +59,13 @@ fn is_half_width(value: f32) -> bool {
 
 impl Joint {
     /// Where the generator is, by an absolute reading of the output under a torque, both to within ± their half-widths.
-    /// For start-up, where the generator's encoder has another zero each time it is switched on: the answer is the angle
-    /// that [`Encoder::start`](crate::Encoder::start) and [`StartUp::new`](crate::StartUp::new) begin with.
+    /// For start-up, where the generator's encoder has another zero each time it is switched on: the answer is the
+    /// angle that [`Encoder::start`](crate::Encoder::start) and [`StartUp::new`](crate::StartUp::new) begin with.
     ///
     /// The half-width of the reading includes what the table missed of its samples
     /// ([`Table::projection_worst_rad`](crate::Table::projection_worst_rad)). The turn of the output is the one that is
-    /// given. Two inverse solutions at both ends of the torque's interval and at each node between.
+    /// given. Two inverse solutions at both ends of the torque's interval and at each node between: 2100 to 38 700
+    /// instructions.
     #[must_use]
     pub fn locate(
         &self,
@@ -129,14 +130,16 @@ impl Joint {
     }
 
     /// The torque, by the wind-up: at which the table, at this generator angle and on the flank that `play` knows, has
-    /// the output where it is read. On a flank that is not known, or between both, it is any torque from that of the one
-    /// to that of the other: two to three times the drag, and all that the play swallows.
+    /// the output where it is read. On a flank that is not known, or between both, it is any torque from that of the
+    /// one to that of the other: twice the drag, and all that the play swallows.
     ///
-    /// The flank is known after motion through the whole play: of the state of a joint whose ticks were given the
-    /// torque ([`JointState::play`](crate::JointState::play)); else say
-    /// [`PlayState::after_motion`] while the output moves, [`PlayState::unknown`] where it stands, as it then may rest
-    /// on the other flank. The half-width of the reading is that of [`Self::locate`]; the adjustment is the one of the
-    /// tick. As often as a tick, at the cost of some eight.
+    /// The flank is known after motion through the whole play, of the state of a joint whose ticks were given the
+    /// torque ([`JointState::play`](crate::JointState::play)). Else say [`PlayState::after_motion`] while the output
+    /// moves, and [`PlayState::unknown`] where it stands: a load that changes takes it to the other flank. The
+    /// half-width of the reading is that of [`Self::locate`]; the adjustment is the one of the tick.
+    ///
+    /// At each node of the torque axis, and ten times for each end of the interval, a quarter of a tick: 15 500
+    /// instructions with the table of a cam, 37 600 with that of two rollers, which has the most nodes.
     #[must_use]
     pub fn torque(
         &self,
@@ -241,7 +244,7 @@ mod tests {
     use crate::joint::Overrun;
     use crate::play::Direction;
     use crate::store::Images;
-    use crate::table::{Table, image_bytes};
+    use crate::table::{Approach, Table, image_bytes};
     use crate::upset::Upset;
     use crate::write::{Provenance, TableData, write_image};
     use std::vec;
@@ -351,6 +354,18 @@ mod tests {
         }
     }
 
+    /// An output that is ahead of ideal wants less of it, whichever way the generator turns.
+    #[test]
+    fn the_correction_opposes_the_error_for_both_senses() {
+        for fixed in [FixedMember::Flexspline, FixedMember::CircularSpline] {
+            let drive = Drive::new(188, 190, fixed).unwrap();
+            let (joint, store) = joint(drive, &plain(drive, &[0.009, 0.01], 1e-4));
+            let forward = Approach::Moving(Direction::Forward);
+            let command = joint.inverse(&store, OutputAngle::ZERO, 50.0, forward).generator.to_rad();
+            assert!((command + (0.01 - 1e-4) * drive.exact_ratio()).abs() < 1e-6, "{command}");
+        }
+    }
+
     #[test]
     fn what_is_no_number_locates_nothing_and_is_no_torque() {
         let (joint, store) = joint(fixture::drive(), &fixture::image(true));
@@ -383,7 +398,8 @@ mod tests {
         }
     }
 
-    /// On both flanks and between them, with a reading that is off by up to what it says: the interval holds the torque.
+    /// On both flanks and between them, with a reading that is off by up to what it says: the interval holds the
+    /// torque.
     #[test]
     fn the_interval_of_a_torque_holds_it() {
         let image = fixture::image(true);
