@@ -198,7 +198,8 @@ pub extern "C" fn flexspline_joint_locate(
 /// the output there while it moves forward (+1) or backward (-1), or on the flank that the state knows (0). The state
 /// knows it where its ticks were given the torque; one that was never ticked knows none, as it is right for an output
 /// that stands: the interval then goes from the torque of one flank to that of the other. The half-width of the
-/// reading, rad, is that of `flexspline_joint_locate`; the adjustment is that of the tick, or null.
+/// reading, rad, is that of `flexspline_joint_locate`; the adjustment is that of the tick, or null. It takes ten to
+/// twenty times as long as a tick.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_torque(
     joint: *const FlexsplineJoint,

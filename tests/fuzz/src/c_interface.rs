@@ -597,7 +597,8 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let objects = [joint, store];
             let to = memory.answer::<c::FlexsplineLocated>(choices, &objects);
             let [off, torque, torque_off] = [1e-5, 5.0, 2.0].map(|usual| choices.mostly(usual));
-            let status = c::flexspline_joint_locate(joint_at, store_at, choices.any(), off, torque, torque_off, to.pointer);
+            let status =
+                c::flexspline_joint_locate(joint_at, store_at, choices.any(), off, torque, torque_off, to.pointer);
             if status as u32 == OK {
                 let found = unsafe { to.pointer.read() };
                 assert!(found.half_width_rad >= 0.0 && (found.turns == 0) == (found.quality == 3), "{found:?}");

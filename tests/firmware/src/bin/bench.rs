@@ -155,9 +155,10 @@ type Ranges = [(&'static str, Range); 10];
 /// Counts with one table; the tick's is given back.
 ///
 /// `tick`, and `forward`, `inverse`, `place` (of the generator by the output, under a load known to 5 N·m) and `torque`
-/// as they are called alone, from locating the torque to angles. Then the parts of a tick, each called alone: `locate` the torque, `output` (nominal, ripple and play) and, of that, the `play`,
-/// `solve` for the command; the rest is what is left of the tick: judging the sample, goal, limiter, flags, sums. A
-/// `slice` of the slow group checks a word of the images and makes one of the copies anew.
+/// as they are called alone, from locating the torque to angles. Then the parts of a tick, each called alone: `locate`
+/// the torque, `output` (nominal, ripple and play) and, of that, the `play`, `solve` for the command; the rest is what
+/// is left of the tick: judging the sample, goal, limiter, flags, sums. A `slice` of the slow group checks a word of
+/// the images and makes one of the copies anew.
 fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option<Range> {
     let images = Images::new(first, second);
     let mut store = Store::new();
