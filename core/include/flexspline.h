@@ -547,6 +547,38 @@ typedef struct FlexsplineCommand {
   uint8_t quality;
 } FlexsplineCommand;
 
+// Where the generator is by a reading of the output.
+typedef struct FlexsplineLocated {
+  // Generator angle, counts of 2^-32 turn: the middle of what is possible; output times ratio if disabled.
+  int64_t generator_counts;
+  // It lies within +- this, rad of the generator; infinite if disabled. The sum of the three below.
+  float half_width_rad;
+  // What the reading makes of it.
+  float of_reading_rad;
+  // What the play makes of it.
+  float of_play_rad;
+  // The rest: the load, and the table's inverse.
+  float of_load_rad;
+  // Whole turns of the generator that remain possible: 1 if it is located, 0 if disabled.
+  uint32_t turns;
+  // `FLEXSPLINE_QUALITY_...`: located where it is in range. Uncertain: more than half a turn to either side remains
+  // possible, and the largest of the three parts says why.
+  uint8_t quality;
+} FlexsplineLocated;
+
+// The torque by the wind-up.
+typedef struct FlexsplineTorqueFromWindUp {
+  // Middle of the interval within the table's range, N m; NaN if disabled.
+  float torque_n_m;
+  // The torque is no less, N m; -infinity where the table ends before the reading is reached.
+  float low_n_m;
+  // It is no more, N m; infinity likewise.
+  float high_n_m;
+  // `FLEXSPLINE_QUALITY_...`. Uncertain: the flank or the adjustment is not known. Extrapolated: the interval is
+  // open, or the temperature lies beyond the table.
+  uint8_t quality;
+} FlexsplineTorqueFromWindUp;
+
 // Where a drive rests inside its play.
 typedef struct FlexsplinePlay {
   // Nominal output of the last tick with a sample, counts of 2^-32 turn; 0 before the first.
@@ -1116,6 +1148,33 @@ enum FlexsplineStatus flexspline_inverse(const struct FlexsplineJoint *joint,
                                          int8_t direction,
                                          struct FlexsplineCommand *command);
 
+// Where the generator is by an absolute reading of the output, counts of 2^-32 turn, under a torque, N m, both to
+// within +- their half-widths; that of the reading with what the table missed (`projection_worst_rad`). For start-up:
+// `flexspline_encoder_start` begins with the answer. The turn of the output is the one that is given.
+enum FlexsplineStatus flexspline_joint_locate(const struct FlexsplineJoint *joint,
+                                              const struct FlexsplineStore *store,
+                                              int64_t output_counts,
+                                              float output_half_width_rad,
+                                              float torque_n_m,
+                                              float torque_half_width_n_m,
+                                              struct FlexsplineLocated *located);
+
+// The torque by the wind-up, of a generator angle and a reading of the output, counts of 2^-32 turn: that which brings
+// the output there while it moves forward (+1) or backward (-1), or on the flank that the state knows (0). The state
+// knows it where its ticks were given the torque; one that was never ticked knows none, as it is right for an output
+// that stands: the interval then goes from the torque of one flank to that of the other. The half-width of the
+// reading, rad, is that of `flexspline_joint_locate`; the adjustment is that of the tick, or null. It takes ten to
+// twenty times as long as a tick.
+enum FlexsplineStatus flexspline_joint_torque(const struct FlexsplineJoint *joint,
+                                              const struct FlexsplineStore *store,
+                                              const struct FlexsplineState *state,
+                                              const struct FlexsplineAdjustment *adjustment,
+                                              int8_t direction,
+                                              int64_t generator_counts,
+                                              int64_t output_counts,
+                                              float output_half_width_rad,
+                                              struct FlexsplineTorqueFromWindUp *torque);
+
 // Nominal output angle of a generator angle, counts of 2^-32 turn: generator over ratio.
 enum FlexsplineStatus flexspline_nominal_output(const struct FlexsplineJoint *joint,
                                                 int64_t generator_counts,
@@ -1636,7 +1695,7 @@ enum FlexsplineStatus flexspline_motion_ahead(const struct FlexsplineJoint *join
 // What `flexspline_layout` says where program and library agree on the size of all types above: `if (flexspline_layout() != FLEXSPLINE_LAYOUT) stop();`
 #define FLEXSPLINE_AND_SIZE_(type) * 31u + (uint32_t)sizeof(type))
 #define FLEXSPLINE_LAYOUT \
-  (((((((((((((((((((((((((((((((((((((((((((((((((((0u \
+  (((((((((((((((((((((((((((((((((((((((((((((((((((((0u \
   FLEXSPLINE_AND_SIZE_(FlexsplineStatus) \
   FLEXSPLINE_AND_SIZE_(size_t) \
   FLEXSPLINE_AND_SIZE_(FlexsplineStore) \
@@ -1664,6 +1723,8 @@ enum FlexsplineStatus flexspline_motion_ahead(const struct FlexsplineJoint *join
   FLEXSPLINE_AND_SIZE_(FlexsplineDisturbance) \
   FLEXSPLINE_AND_SIZE_(FlexsplinePrediction) \
   FLEXSPLINE_AND_SIZE_(FlexsplineCommand) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineLocated) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineTorqueFromWindUp) \
   FLEXSPLINE_AND_SIZE_(FlexsplinePlay) \
   FLEXSPLINE_AND_SIZE_(FlexsplineImageReport) \
   FLEXSPLINE_AND_SIZE_(FlexsplineTorqueSettings) \

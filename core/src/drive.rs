@@ -199,17 +199,6 @@ impl Drive {
     pub(crate) const fn tooth_periods(&self) -> f32 {
         self.ratio() * self.ripple_order() as f32
     }
-
-    /// The generator angle that brings an output with this error to `target`, and the nominal output there:
-    /// `target·ratio + command_correction` with `command_correction = −predicted_error·ratio`.
-    ///
-    /// The error is at the output, positive when the output is ahead of ideal. This is the one place where the sign of
-    /// the correction is set. NaN corrects nothing.
-    #[must_use]
-    pub fn corrected_command(&self, target: OutputAngle, predicted_error_rad: f32) -> (GeneratorAngle, OutputAngle) {
-        let nominal = target.offset_rad(-predicted_error_rad);
-        (self.nominal_generator(nominal), nominal)
-    }
 }
 
 /// A ratio of tooth counts: a whole part and 64 fractional bits, the last 0.
@@ -369,18 +358,6 @@ mod tests {
         let half_pitch = GeneratorAngle::from_rad(core::f64::consts::PI / 188.0).unwrap();
         let tooth = drive.phases(half_pitch, drive.nominal_output(half_pitch)).tooth;
         assert!(tooth.abs_diff(1 << 31) <= 94, "{tooth}");
-    }
-
-    #[test]
-    fn the_correction_opposes_the_error_for_both_senses() {
-        let (generator, nominal) = hhd_95().corrected_command(OutputAngle::ZERO, 0.01);
-        assert!((nominal.to_rad() + 0.01).abs() < 1e-9);
-        assert!((generator.to_rad() + 0.01 * 95.0).abs() < 1e-7);
-        let reversed = Drive::new(190, 192, FixedMember::CircularSpline).unwrap();
-        let (generator, _) = reversed.corrected_command(OutputAngle::ZERO, 0.01);
-        assert!((generator.to_rad() - 0.01 * 95.0).abs() < 1e-7);
-        let (generator, _) = reversed.corrected_command(OutputAngle::new(1, 0), f32::NAN);
-        assert_eq!(generator, GeneratorAngle::new(-95, 0));
     }
 
     proptest! {

@@ -88,8 +88,7 @@
 //!
 //! # Signs and units
 //! * Angles in radians at the interface, positive counter-clockwise; torque N·m, temperature °C.
-//! * `transmission_error = actual − ideal` at the output. `command_correction = −predicted_error·ratio`
-//!   ([`Drive::corrected_command`]).
+//! * `transmission_error = actual − ideal` at the output. `command_correction = −predicted_error·ratio`.
 //! * The ratio is signed: `+cs/(cs − fs)` with the flexspline fixed, `−fs/(cs − fs)` with the circular spline fixed.
 //! * Positive load torque turns the output forward and gives positive wind-up.
 //! * A [`Direction`] is that of the output, in samples (of `flexspline-make`, a column `direction`: +1 where the
@@ -147,15 +146,14 @@ pub use drive::{Drive, FixedMember, Phases};
 pub use encoder::{Encoder, EncoderError, EncoderSettings, EncoderState, EncoderWrap};
 pub use error::{DriveError, Field, ImageError};
 pub use joint::{
-    Adjustment, Aged, Flags, Implausible, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, Readings,
-    RestoreError, SettingError, StartUp, StartUpSettings, StartUpStep, TorquePath, TorqueReading, TorqueSettings,
+    Adjustment, Aged, Flags, Implausible, Input, Joint, JointState, Limits, Located, Mode, ModeError, Output, Overrun,
+    Readings, RestoreError, SettingError, StartUp, StartUpSettings, StartUpStep, TorqueFromWindUp, TorquePath,
+    TorqueReading, TorqueSettings,
 };
 pub use play::{Direction, PlayState};
 pub use self_test::{SelfTestError, self_test};
 pub use store::{ActivateError, Activation, Counters, Health, Images, Progress, Store, Upload, UploadError};
-pub use table::{
-    Approach, Bounds, Command, GeneratorKind, Identity, IdentityCheck, Prediction, Quality, Table, TableId,
-};
+pub use table::{Approach, Command, GeneratorKind, Identity, IdentityCheck, Prediction, Quality, Table, TableId};
 pub use unit::{Arcsec, Degrees};
 
 // The writer of images is that of `flexspline-make`: the tests of the reader need it, with the types of this crate.

@@ -164,6 +164,14 @@ impl PlayState {
         (possible && (started || fresh)).then_some(state)
     }
 
+    /// Whether the output rests on the forward flank of its play, and whether on the backward one, once the generator
+    /// has moved on to this nominal output: as far as that is known.
+    pub(crate) const fn flanks_at(mut self, nominal: OutputAngle) -> [bool; 2] {
+        let _ = self.follow(nominal, 0, 0, false);
+        let has_flanks = self.half > 0;
+        [has_flanks & (self.upper == self.half.wrapping_neg()), has_flanks & (self.lower == self.half)]
+    }
+
     /// Whether there was an update.
     pub(crate) const fn is_started(&self) -> bool {
         self.half >= 0

@@ -32,6 +32,42 @@ pub struct FlexsplineCommand {
     pub quality: u8,
 }
 
+/// Where the generator is by a reading of the output.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineLocated {
+    /// Generator angle, counts of 2^-32 turn: the middle of what is possible; output times ratio if disabled.
+    pub generator_counts: i64,
+    /// It lies within +- this, rad of the generator; infinite if disabled. The sum of the three below.
+    pub half_width_rad: f32,
+    /// What the reading makes of it.
+    pub of_reading_rad: f32,
+    /// What the play makes of it.
+    pub of_play_rad: f32,
+    /// The rest: the load, and the table's inverse.
+    pub of_load_rad: f32,
+    /// Whole turns of the generator that remain possible: 1 if it is located, 0 if disabled.
+    pub turns: u32,
+    /// `FLEXSPLINE_QUALITY_...`: located where it is in range. Uncertain: more than half a turn to either side remains
+    /// possible, and the largest of the three parts says why.
+    pub quality: u8,
+}
+
+/// The torque by the wind-up.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineTorqueFromWindUp {
+    /// Middle of the interval within the table's range, N m; NaN if disabled.
+    pub torque_n_m: f32,
+    /// The torque is no less, N m; -infinity where the table ends before the reading is reached.
+    pub low_n_m: f32,
+    /// It is no more, N m; infinity likewise.
+    pub high_n_m: f32,
+    /// `FLEXSPLINE_QUALITY_...`. Uncertain: the flank or the adjustment is not known. Extrapolated: the interval is
+    /// open, or the temperature lies beyond the table.
+    pub quality: u8,
+}
+
 /// Where a drive rests inside its play.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
@@ -125,6 +161,72 @@ pub extern "C" fn flexspline_inverse(
             generator_counts: found.generator.counts(),
             predicted_error_rad: found.predicted_error_rad,
             uncertainty_rad: found.uncertainty_rad,
+            quality: found.quality.code(),
+        })
+    })
+}
+
+/// Where the generator is by an absolute reading of the output, counts of 2^-32 turn, under a torque, N m, both to
+/// within +- their half-widths; that of the reading with what the table missed (`projection_worst_rad`). For start-up:
+/// `flexspline_encoder_start` begins with the answer. The turn of the output is the one that is given.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_joint_locate(
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    output_counts: i64,
+    output_half_width_rad: f32,
+    torque_n_m: f32,
+    torque_half_width_n_m: f32,
+    located: *mut FlexsplineLocated,
+) -> FlexsplineStatus {
+    answer(located, [span(joint), span(store)], || {
+        let (store, output) = (store_of(store)?, OutputAngle::from_counts(output_counts));
+        let found = joint_of(joint)?.locate(store, output, output_half_width_rad, torque_n_m, torque_half_width_n_m);
+        Ok(FlexsplineLocated {
+            generator_counts: found.generator.counts(),
+            half_width_rad: found.half_width_rad,
+            of_reading_rad: found.of_reading_rad,
+            of_play_rad: found.of_play_rad,
+            of_load_rad: found.of_load_rad,
+            turns: found.turns,
+            quality: found.quality.code(),
+        })
+    })
+}
+
+/// The torque by the wind-up, of a generator angle and a reading of the output, counts of 2^-32 turn: that which brings
+/// the output there while it moves forward (+1) or backward (-1), or on the flank that the state knows (0). The state
+/// knows it where its ticks were given the torque; one that was never ticked knows none, as it is right for an output
+/// that stands: the interval then goes from the torque of one flank to that of the other. The half-width of the
+/// reading, rad, is that of `flexspline_joint_locate`; the adjustment is that of the tick, or null. It takes ten to
+/// twenty times as long as a tick.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_joint_torque(
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    state: *const FlexsplineState,
+    adjustment: *const FlexsplineAdjustment,
+    direction: i8,
+    generator_counts: i64,
+    output_counts: i64,
+    output_half_width_rad: f32,
+    torque: *mut FlexsplineTorqueFromWindUp,
+) -> FlexsplineStatus {
+    answer(torque, [span(joint), span(store), span(state), span(adjustment)], || {
+        let (joint, store, state) = (joint_of(joint)?, store_of(store)?, state_of(state)?);
+        let none = Adjustment::default();
+        let adjustment = if adjustment.is_null() { &none } else { get(adjustment, Object::Adjustment)? };
+        let play = match direction {
+            0 => *state.play(),
+            sign => PlayState::after_motion(direction_of(sign)?),
+        };
+        let (generator, output) =
+            (GeneratorAngle::from_counts(generator_counts), OutputAngle::from_counts(output_counts));
+        let found = joint.torque(store, &play, adjustment, generator, output, output_half_width_rad);
+        Ok(FlexsplineTorqueFromWindUp {
+            torque_n_m: found.torque_n_m,
+            low_n_m: found.low_n_m,
+            high_n_m: found.high_n_m,
             quality: found.quality.code(),
         })
     })

@@ -389,6 +389,31 @@ fn questions(
         assert_eq!(found.predicted_error_rad.to_bits(), expected.predicted_error_rad.to_bits());
         assert_eq!((found.uncertainty_rad, found.quality), (expected.uncertainty_rad, expected.quality.code()));
     }
+    let mut found = FlexsplineLocated::default();
+    assert_eq!(flexspline_joint_locate(&o.joint, &*o.store, target, 1e-5, torque, 2.0, &mut found), Done);
+    let output = OutputAngle::from_counts(target);
+    let expected = joint.locate(store, output, 1e-5, torque, 2.0);
+    assert_eq!((found.generator_counts, found.turns), (expected.generator.counts(), expected.turns));
+    assert_eq!((found.half_width_rad, found.quality), (expected.half_width_rad, expected.quality.code()));
+    let parts = [expected.of_reading_rad, expected.of_play_rad, expected.of_load_rad];
+    assert_eq!([found.of_reading_rad, found.of_play_rad, found.of_load_rad], parts);
+    let mut c_adjustment = room!(FlexsplineAdjustment);
+    assert_eq!(flexspline_adjustment_init(&mut c_adjustment), Done);
+    assert_eq!(flexspline_adjustment_add(&mut c_adjustment, 20_000, -3_000, 1e-6), Done);
+    let adjusted = Adjustment::new(20_000, -3_000).with_uncertainty(1e-6);
+    for (direction, play, given, adjustment) in [
+        (1, PlayState::after_motion(Direction::Forward), null(), Adjustment::default()),
+        (-1, PlayState::after_motion(Direction::Backward), &raw const c_adjustment, adjusted),
+        (0, *state.play(), &raw const c_adjustment, adjusted),
+    ] {
+        let mut found = FlexsplineTorqueFromWindUp::default();
+        let (now, to) = (generator.counts(), &mut found);
+        let asked = flexspline_joint_torque(&o.joint, &*o.store, &o.state, given, direction, now, target, 1e-5, to);
+        let expected = joint.torque(store, &play, &adjustment, generator, output, 1e-5);
+        assert_eq!((asked, found.torque_n_m.to_bits()), (Done, expected.torque_n_m.to_bits()));
+        assert_eq!([found.low_n_m, found.high_n_m], [expected.low_n_m, expected.high_n_m]);
+        assert_eq!(found.quality, expected.quality.code());
+    }
     let mut rate = 0.0f32;
     let asked = flexspline_rate_ahead(&o.joint, &*o.store, target, -0.01, torque, 4e-3, &mut rate);
     let expected = joint.rate_ahead(store, OutputAngle::from_counts(target), -0.01, torque, 4e-3);
@@ -722,6 +747,19 @@ fn what_is_not_allowed_is_refused() {
     assert!(ahead.rate_rad_s.is_nan() && ahead.acceleration_rad_s2.is_nan(), "no table");
     let mut command = FlexsplineCommand::default();
     assert_eq!(flexspline_inverse(&o.joint, &*o.store, &o.state, 0, 0.0, 2, &mut command), Argument);
+    let mut torque = FlexsplineTorqueFromWindUp::default();
+    let ask = |adjustment, direction, torque| {
+        flexspline_joint_torque(&o.joint, &*o.store, &o.state, adjustment, direction, 0, 0, 1e-5, torque)
+    };
+    assert_eq!(ask(null(), 2, &mut torque), Argument);
+    let nothing = room!(FlexsplineAdjustment);
+    assert_eq!(ask(&nothing, 1, &mut torque), NotInitialised);
+    let inside = (&raw const nothing).cast_mut().cast();
+    assert_eq!((ask(&nothing, 1, inside), ask(null(), 1, null_mut())), (Overlap, Pointer));
+    assert_eq!((ask(null(), 0, &mut torque), torque.quality), (Done, FLEXSPLINE_QUALITY_DISABLED));
+    let mut located = FlexsplineLocated::default();
+    let asked = flexspline_joint_locate(&o.joint, &*o.store, 0, 1e-5, 0.0, 0.0, &mut located);
+    assert_eq!((asked, located.turns, located.quality), (Done, 0, FLEXSPLINE_QUALITY_DISABLED));
     let mut other = made();
     assert_eq!(flexspline_state_request(&mut other.state, FLEXSPLINE_MODE_HOLD), NoMode);
     let mut input = INPUT;

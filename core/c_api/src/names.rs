@@ -93,7 +93,7 @@ const _: () = {
 };
 
 /// Sizes of all that goes between C and the library: what `FLEXSPLINE_LAYOUT` of the header adds up.
-const SIZES: [usize; 51] = [
+const SIZES: [usize; 53] = [
     size_of::<FlexsplineStatus>(),
     size_of::<usize>(),
     size_of::<FlexsplineStore>(),
@@ -121,6 +121,8 @@ const SIZES: [usize; 51] = [
     size_of::<FlexsplineDisturbance>(),
     size_of::<FlexsplinePrediction>(),
     size_of::<FlexsplineCommand>(),
+    size_of::<FlexsplineLocated>(),
+    size_of::<FlexsplineTorqueFromWindUp>(),
     size_of::<FlexsplinePlay>(),
     size_of::<FlexsplineImageReport>(),
     size_of::<FlexsplineTorqueSettings>(),

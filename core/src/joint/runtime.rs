@@ -212,7 +212,7 @@ impl Joint {
 
     /// The table at a torque, for the drive of settings that are whole: a table for another one gives nothing.
     #[inline(always)]
-    fn at<'s>(&'s self, store: &'s Store, torque_n_m: f32) -> (TableModel<'s, Store>, OperatingPoint) {
+    pub(super) fn at<'s>(&'s self, store: &'s Store, torque_n_m: f32) -> (TableModel<'s, Store>, OperatingPoint) {
         let drive = self.drive();
         let torque_n_m = if store.is_for(drive) { torque_n_m } else { f32::NAN };
         (TableModel { memory: store, drive }, store.locate_whole(torque_n_m))
@@ -1053,6 +1053,7 @@ mod tests {
         let mut run = Loop::new(Overrun::SkipAndCount);
         run.run(300, 1e-3, 1e-5);
         let (store, target, generator) = (&run.store, run.input(5e-3).target, run.generator.offset_rad(0.01));
+        let read = run.state.play().output().unwrap();
         let answers = |joint: &Joint, state: &JointState| {
             let mut play = *state.play();
             let moving = Approach::Moving(crate::Direction::Backward);
@@ -1061,11 +1062,16 @@ mod tests {
                 [moving, Approach::From(state.play())].map(|approach| joint.inverse(store, target, 5.0, approach)),
                 joint.rate_ahead(store, target, 0.01, 5.0, 4e-3),
                 joint.motion_ahead(store, target, [0.01, 0.1], 5.0, 4e-3),
+                (
+                    joint.locate(store, target, 1e-5, 5.0, 1.0),
+                    joint.torque(store, state.play(), &Adjustment::default(), run.generator, read, 1e-6),
+                ),
                 (*joint.drive(), state.mode(), *state.play()),
             )
         };
         let expected = answers(&run.joint, &run.state);
         assert!(expected.0.quality == Quality::InRange && expected.2.is_finite());
+        assert_eq!([expected.4.0.quality, expected.4.1.quality], [Quality::InRange; 2]);
         for bit in 0..run.joint.bits() {
             let mut joint = run.joint;
             joint.flip(bit, &mut std::string::String::new());
@@ -1084,7 +1090,8 @@ mod tests {
         for bit in [0, state.bits() / 2 + 40] {
             state.flip(bit, &mut std::string::String::new());
         }
-        let (forward, inverse, rate, motion, _) = answers(&joint, &run.state);
+        let (forward, inverse, rate, motion, (located, torque), _) = answers(&joint, &run.state);
+        assert_eq!([located.quality, torque.quality], [Quality::Disabled; 2]);
         assert!(joint.is_lost() && rate.is_nan() && motion[1].is_nan());
         assert!([forward.quality, inverse[0].quality, inverse[1].quality] == [Quality::Disabled; 3]);
         assert_eq!((state.mode(), *state.play()), (Mode::Safe, PlayState::unknown()));

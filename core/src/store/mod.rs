@@ -36,6 +36,7 @@ use crate::table::{
 };
 use crate::whole::pair;
 use copies::{Copied, SLACK, STORE_WORDS, agreed};
+use core::iter::once;
 use health::STORE_PAGES;
 use source::{ACTIVE, Fresh, IN_RANGE, ImageSource, SealedSource, Strangers, TORN};
 
@@ -399,6 +400,24 @@ impl Store {
         let (active, in_range) = (source.marks & ACTIVE != 0, source.marks & IN_RANGE != 0);
         let marks = (num::finite(torque_n_m) & active, (torque == torque_n_m) & in_range);
         OperatingPoint::new(place, around, rows, (0, 0), marks, doubt).adjusted(&source.plan, mean, half_width)
+    }
+
+    /// Torques that the table holds for, N·m.
+    pub(crate) const fn torque_range(&self) -> [f32; 2] {
+        self.source().torque_range
+    }
+
+    /// Both ends of a range of torques, and between them the nodes that lie within, upwards: each with what the copies
+    /// disagree in.
+    pub(crate) fn torques(&self, [least, most]: [f32; 2]) -> impl Iterator<Item = (f32, Doubt)> {
+        let nodes = (self.source().last_torque as usize).min(grid::MAX_CLAMPED_NODES).wrapping_add(2);
+        let between = (0..nodes).map(move |node: usize| {
+            let mut doubt = Doubt(0);
+            let [torque] = self.words(node, &mut doubt).map(f32::from_bits);
+            (torque, doubt)
+        });
+        let within = between.filter(move |(torque, doubt)| (least < *torque && *torque < most) || !doubt.none());
+        once((least, Doubt(0))).chain(within).chain(once((most, Doubt(0))))
     }
 
     /// Images that are not to be used: not those that were activated, or both the same.

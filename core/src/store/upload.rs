@@ -220,7 +220,7 @@ mod tests {
                 Err(_) => refused += 1,
                 Ok(table) => {
                     harmless += usize::from(image != whole);
-                    let bounds = table.bounds();
+                    let bounds = table.bounds;
                     assert!(bounds.slope < 1.0 && bounds.error_rad <= table.error_limit_rad());
                     assert!(table.inverse_error_bound_rad() <= crate::Table::MAX_INVERSE_ERROR_RAD);
                     for _ in 0..10 {

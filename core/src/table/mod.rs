@@ -34,7 +34,6 @@ mod read;
 pub mod windup;
 mod words;
 
-pub use bounds::Bounds;
 pub use identity::{Identity, IdentityCheck};
 #[cfg(any(test, feature = "testing"))]
 pub use image::reseal;
@@ -49,10 +48,11 @@ pub use model::{Approach, Command, Prediction};
 pub(crate) use model::{Estimate, TableModel, departure};
 pub(crate) use point::TorquePlace;
 pub use point::{OperatingPoint, Quality};
+pub(crate) use read::play_at;
 pub(crate) use words::{Words, blend_halves, blend_number, f32_at, halves, word_at, words_from};
 
 use crate::drive::Drive;
-use bounds::InverseBound;
+use bounds::{Bounds, InverseBound};
 use grid::PeriodicAxis;
 
 /// Kind of wave generator, for the record.
@@ -229,9 +229,9 @@ impl<'a> Table<'a> {
         self.ripple
     }
 
-    /// Bounds computed from the coefficients when the table was accepted.
+    /// Bound of |ratio·de/dψ|, below 1, from the coefficients when the table was accepted.
     #[must_use]
-    pub const fn bounds(&self) -> Bounds {
-        self.bounds
+    pub const fn slope_bound(&self) -> f32 {
+        self.bounds.slope
     }
 }

@@ -1,8 +1,7 @@
 //! Forward and inverse: what the output does, and what to command so that it does what is wanted.
 //!
-//! Signs: `transmission_error = actual − ideal` at the output; the command correction is its negative times the ratio
-//! ([`Drive::corrected_command`](crate::Drive::corrected_command)). Positive load torque turns the
-//! output forward.
+//! Signs: `transmission_error = actual − ideal` at the output; the command correction is its negative times the ratio.
+//! Positive load torque turns the output forward.
 //!
 //! No search or loop whose length depends on the inputs, no heap, no panic, no libm. The instructions that a step takes
 //! are counted by `tests/firmware` and held by `tests/run firmware`.
@@ -605,7 +604,7 @@ mod tests {
                 // The widest play here: half the backlash of 60″ and the drag, both ways.
                 let width = 2.0 * 45.0 * ARCSEC;
                 let off = there.output.minus_rad(target).abs() as f64;
-                prop_assert!(off < table.bounds().slope as f64 * width, "{} arcsec off", off / ARCSEC);
+                prop_assert!(off < table.bounds.slope as f64 * width, "{} arcsec off", off / ARCSEC);
             }
         }
     }

@@ -198,7 +198,7 @@ mod tests {
     fn neither_jumps_nor_other_temperatures_widen_the_bound() {
         let means = [-1.0e-3, -1.0e-3, 3.0e-3, 3.0e-3, -2.0e-3, -2.0e-3, 2.0e-3, 2.0e-3];
         let image = image(&[-20.0, -0.01, 0.01, 20.0], &means, &[0.0, 40.0]);
-        let bounds = Table::check(&image).unwrap().bounds();
+        let bounds = Table::check(&image).unwrap().bounds;
         assert!((bounds.error_rad - 3.001e-3).abs() < 1.0e-9, "{bounds:?}");
     }
 

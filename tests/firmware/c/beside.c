@@ -137,7 +137,19 @@ static int ask(int64_t generator, int64_t target, float torque)
             return 2;
         take((uint64_t)command.generator_counts);
         take_float(command.uncertainty_rad);
+        FlexsplineTorqueFromWindUp by_wind_up;
+        if (flexspline_joint_torque(&joint, &store, &state, 0, direction, generator, target, 1e-5f, &by_wind_up))
+            return 4;
+        take_float(by_wind_up.low_n_m);
+        take_float(by_wind_up.high_n_m);
+        take(by_wind_up.quality);
     }
+    FlexsplineLocated located;
+    if (flexspline_joint_locate(&joint, &store, target, 1e-5f, torque, 2.0f, &located))
+        return 5;
+    take((uint64_t)located.generator_counts);
+    take_float(located.half_width_rad);
+    take(located.turns);
     const FlexsplineNow now = {
         .generator_counts = generator,
         .torque_n_m = torque,

@@ -593,6 +593,32 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let to = memory.answer(choices, &[predictor]);
             answered(c::flexspline_predictor_parts(predictor.pointer.cast(), to.pointer), &[predictor], to)
         }
+        39 if choices.any() => {
+            let objects = [joint, store];
+            let to = memory.answer::<c::FlexsplineLocated>(choices, &objects);
+            let [off, torque, torque_off] = [1e-5, 5.0, 2.0].map(|usual| choices.mostly(usual));
+            let status =
+                c::flexspline_joint_locate(joint_at, store_at, choices.any(), off, torque, torque_off, to.pointer);
+            if status as u32 == OK {
+                let found = unsafe { to.pointer.read() };
+                assert!(found.half_width_rad >= 0.0 && (found.turns == 0) == (found.quality == 3), "{found:?}");
+            }
+            answered(status, &objects, to)
+        }
+        40 if choices.any() => {
+            let objects = [joint, store, state];
+            let to = memory.answer::<c::FlexsplineTorqueFromWindUp>(choices, &objects);
+            let (way, generator, output) = (choices.below(5) as i8 - 2, choices.any(), choices.any::<i32>().into());
+            let (off, none) = (choices.mostly(1e-5), null());
+            let torque = c::flexspline_joint_torque;
+            let status = torque(joint_at, store_at, state_at, none, way, generator, output, off, to.pointer);
+            if status as u32 == OK {
+                let found = unsafe { to.pointer.read() };
+                assert!(found.low_n_m <= found.high_n_m && found.quality <= 3, "{found:?}");
+                assert!(found.torque_n_m.is_finite() == (found.quality != 3), "{found:?}");
+            }
+            answered(status, &objects, to)
+        }
         39 => {
             let to = memory.answer(choices, &[joint, store, state]);
             let torque = choices.wild();

@@ -397,7 +397,7 @@ struct WindUp {
 #[test]
 fn the_bounds_hold_and_are_close() {
     let image = fixture::image(true);
-    let bounds = Table::check(&image).unwrap().bounds();
+    let bounds = Table::check(&image).unwrap().bounds;
     let (mut steepest, mut largest): (f64, f64) = (0.0, 0.0);
     for i in 0..100_000 {
         let generator = 596.9 * (i as f64 * 0.618_033_988).rem_euclid(1.0);
@@ -425,7 +425,7 @@ fn a_limit_as_small_as_what_the_table_gives_disables_nothing() {
         ..data()
     };
     let wide = write(&data, &provenance()).unwrap();
-    let reached = Table::check(&wide).unwrap().bounds().error_rad;
+    let reached = Table::check(&wide).unwrap().bounds.error_rad;
     let tight = write(&data, &Provenance { error_limit_rad: reached, ..provenance() }).unwrap();
     let table = Table::check(&tight).unwrap();
     for i in 0..2000 {
@@ -582,7 +582,7 @@ proptest! {
             for torque in [torque, 0.3 * torque, 0.05 * torque] {
                 let found = table.at(torque, temperature).unwrap();
                 let reached = (found.mean.abs() + found.half_width) as f32 * RAD_PER_COUNT;
-                prop_assert!(reached <= 1.0001 * table.bounds().error_rad, "{} at {}", reached, torque);
+                prop_assert!(reached <= 1.0001 * table.bounds.error_rad, "{} at {}", reached, torque);
             }
         }
     }
@@ -605,7 +605,7 @@ proptest! {
             let generator = crate::GeneratorAngle::from_counts(generator);
             let mut state = crate::PlayState::unknown();
             let found = table.forward(&mut state, generator, torque, temperature);
-            prop_assert!(found.transmission_error_rad.abs() <= 1.0001 * table.bounds().error_rad);
+            prop_assert!(found.transmission_error_rad.abs() <= 1.0001 * table.bounds.error_rad);
             prop_assert_eq!(
                 found.quality == crate::Quality::Disabled, !(torque.is_finite() && temperature.is_finite()),
             );

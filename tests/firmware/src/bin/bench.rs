@@ -9,8 +9,9 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::parts::{self, OperatingPoint};
 use flexspline::{
-    Activation, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint, JointState, Mode,
-    Output, OutputAngle, PlayState, Prediction, Progress, Store, self_test,
+    Activation, Adjustment, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint,
+    JointState, Located, Mode, Output, OutputAngle, PlayState, Prediction, Progress, Store, TorqueFromWindUp,
+    self_test,
 };
 use flexspline_estimation::{Measured, PredictorState, TwoMassObserver};
 use flexspline_firmware::count::{Counter, Range};
@@ -35,6 +36,22 @@ fn forward(joint: &Joint, store: &Store, play: &mut PlayState, generator: Genera
 #[inline(never)]
 fn inverse(joint: &Joint, store: &Store, play: &PlayState, target: OutputAngle, torque: f32) -> Command {
     joint.inverse(store, target, torque, Approach::From(play))
+}
+
+#[inline(never)]
+fn place(joint: &Joint, store: &Store, output: OutputAngle, torque: f32) -> Located {
+    joint.locate(store, output, 2e-5, torque, 5.0)
+}
+
+#[inline(never)]
+fn torque(
+    joint: &Joint,
+    store: &Store,
+    play: &PlayState,
+    generator: GeneratorAngle,
+    output: OutputAngle,
+) -> TorqueFromWindUp {
+    joint.torque(store, play, &Adjustment::default(), generator, output, 2e-5)
 }
 
 #[inline(never)]
@@ -133,14 +150,15 @@ fn measure_identity(counter: &Counter, name: &str, image: &[u8]) -> Option<()> {
 }
 
 /// Ranges of one table, by name.
-type Ranges = [(&'static str, Range); 8];
+type Ranges = [(&'static str, Range); 10];
 
 /// Counts with one table; the tick's is given back.
 ///
-/// `tick`, and `forward` and `inverse` as they are called alone, from locating the torque to angles. Then the parts of
-/// a tick, each called alone: `locate` the torque, `output` (nominal, ripple and play) and, of that, the `play`,
-/// `solve` for the command; the rest is what is left of the tick: judging the sample, goal, limiter, flags, sums. A
-/// `slice` of the slow group checks a word of the images and makes one of the copies anew.
+/// `tick`, and `forward`, `inverse`, `place` (of the generator by the output, under a load known to 5 N·m) and `torque`
+/// as they are called alone, from locating the torque to angles. Then the parts of a tick, each called alone: `locate`
+/// the torque, `output` (nominal, ripple and play) and, of that, the `play`, `solve` for the command; the rest is what
+/// is left of the tick: judging the sample, goal, limiter, flags, sums. A `slice` of the slow group checks a word of
+/// the images and makes one of the copies anew.
 fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option<Range> {
     let images = Images::new(first, second);
     let mut store = Store::new();
@@ -148,7 +166,7 @@ fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option
     let (mut state, mut play, mut other) = (JointState::new(), PlayState::unknown(), PlayState::unknown());
     state.request(Mode::Tracking).ok()?;
     let mut trajectory = Trajectory::new(1);
-    let names = ["forward", "inverse", "locate", "output", "play", "solve", "slice", "tick"];
+    let names = ["forward", "inverse", "place", "torque", "locate", "output", "play", "solve", "slice", "tick"];
     let mut ranges: Ranges = names.map(|name| (name, Range::default()));
     let mut generator = GeneratorAngle::ZERO;
     for _ in 0..INPUTS {
@@ -156,16 +174,18 @@ fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option
         let (tick_count, out) = counter.of(|| black_box(tick(&JOINT, &images, &mut store, &mut state, &input)));
         trajectory.saw(&out);
         generator = input.generator.unwrap_or(generator);
-        let (torque, target) = (input.torque_n_m, input.target);
-        let (forwards, _) = counter.of(|| black_box(forward(&JOINT, &store, &mut play, generator, torque)));
-        let (inverses, _) = counter.of(|| black_box(inverse(&JOINT, &store, &play, target, torque)));
-        let (locates, point) = counter.of(|| black_box(locate(&store, torque)));
+        let (load, target) = (input.torque_n_m, input.target);
+        let (forwards, _) = counter.of(|| black_box(forward(&JOINT, &store, &mut play, generator, load)));
+        let (inverses, _) = counter.of(|| black_box(inverse(&JOINT, &store, &play, target, load)));
+        let (places, _) = counter.of(|| black_box(place(&JOINT, &store, out.output, load)));
+        let (torques, _) = counter.of(|| black_box(torque(&JOINT, &store, &play, generator, out.output)));
+        let (locates, point) = counter.of(|| black_box(locate(&store, load)));
         let (outputs, _) = counter.of(|| black_box(output(&JOINT, &store, &point, &mut other, generator)));
         let (plays, _) = counter.of(|| black_box(move_play(&mut other, out.output)));
         let backward = target.counts() & 1 != 0;
         let (solves, _) = counter.of(|| black_box(solve(&JOINT, &store, &point, target, backward)));
         let (slices, ()) = counter.of(|| slice(&mut store, &images));
-        let counts = [forwards, inverses, locates, outputs, plays, solves, slices, tick_count];
+        let counts = [forwards, inverses, places, torques, locates, outputs, plays, solves, slices, tick_count];
         ranges.iter_mut().zip(counts).for_each(|((_, range), count)| range.add(count));
     }
     for (part, range) in ranges {
