@@ -17,7 +17,7 @@ pub(crate) const HOLD_COUNTS: i32 = 8;
 
 /// Largest values of a table, from its coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Bounds {
+pub struct Bounds {
     /// Largest |e|, rad.
     pub error_rad: f32,
     /// Largest deviation of `centre ± half-width` from `D ± H`: the periodic parts together, rad.

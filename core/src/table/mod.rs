@@ -229,9 +229,9 @@ impl<'a> Table<'a> {
         self.ripple
     }
 
-    /// Bound of |ratio·de/dψ|, below 1, from the coefficients when the table was accepted.
+    /// Bounds computed from the coefficients when the table was accepted.
     #[must_use]
-    pub const fn slope_bound(&self) -> f32 {
-        self.bounds.slope
+    pub const fn bounds(&self) -> Bounds {
+        self.bounds
     }
 }
