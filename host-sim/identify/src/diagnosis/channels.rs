@@ -5,8 +5,6 @@
 //! and the direction of motion. What is left of the error is then held against what the nominal model says of the
 //! torque, as recorded and otherwise.
 
-use std::f64::consts::TAU;
-
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
@@ -14,9 +12,9 @@ use super::noise::white_level;
 use super::rows::{Rows, quantile, rms, robust_std};
 use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Refusal, Treatment, least_and_most, throughout,
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Refusal, Treatment, throughout,
 };
-use crate::nominal::Nominal;
+use crate::nominal::{Harmonic, Nominal};
 use flexspline_base::robust::dot;
 
 /// Rows that are looked at, about, spread evenly. *Guess*: some 250 to each of the [`BLOCKS`].
@@ -45,11 +43,9 @@ const EXPLAINS_TURNED: f64 = 0.8;
 const NO_EFFECT: f64 = 0.3;
 /// Degrees in a radian, by definition.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
-/// Generator turns in degrees that tell waves from drift. *Guess*: of a drift without bounds waves that go through so
-/// many periods hold a few per cent.
-const MANY_TURNS: f64 = 5.0;
-/// The reading that is meant leaves less than this share of the squares that the other leaves. *Guess*.
-const LEAVES: f64 = 0.5;
+/// Clearance and waves are those of the model within these factors. *Guess*: they vary much more from unit to unit than
+/// springs do.
+const AS_NOMINAL: [f64; 2] = [0.25, 4.0];
 /// Residuals farther out than this many standard deviations are cut there. *Guess*: no normal row in a million lies so
 /// far out.
 const CUT: f64 = 5.0;
@@ -142,8 +138,12 @@ fn spread(error: &[f64]) -> f64 {
 }
 
 impl<'a> Freed<'a> {
-    fn new(rows: &'a Rows, against: (&'a Nominal, Option<&'a Table<'a>>)) -> Freed<'a> {
-        let sampled = Sampled::new(rows, against, SAMPLE, |places| waves(1.0, &rows.generator, places).to_vec());
+    /// With `further` columns of all rows among what floats.
+    fn new(rows: &'a Rows, against: (&'a Nominal, Option<&'a Table<'a>>), further: &[Vec<f64>]) -> Freed<'a> {
+        let sampled = Sampled::new(rows, against, SAMPLE, |places| {
+            let further = further.iter().map(|column| places.iter().map(|k| column[*k]).collect());
+            waves(1.0, &rows.generator, places).into_iter().chain(further).collect()
+        });
         let mut error = sampled.free.freed(sampled.at(&rows.error));
         let spread = spread(&error);
         error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
@@ -163,6 +163,8 @@ struct TorqueEffect {
     left: f64,
     /// Share of the wind-up alone, whatever the clearance is: that follows the sign of a torque in any unit.
     wind_up: f64,
+    /// Share of the clearance alone.
+    clearance: f64,
 }
 
 impl TorqueEffect {
@@ -175,6 +177,7 @@ impl TorqueEffect {
         // What a table says apart from them is ripple, which the load shapes.
         let error: Vec<f64> = error.iter().zip(&rest).map(|(error, rest)| error - rest).collect();
         let wind_up = share_beside(&error, &wound, &play);
+        let clearance = share_beside(&error, &play, &wound);
         let should: Vec<f64> = wound.iter().zip(&play).map(|(wound, play)| wound + play).collect();
         let block = should.len().div_ceil(BLOCKS).max(1);
         let blocks = should.chunks(block).zip(error.chunks(block));
@@ -183,7 +186,7 @@ impl TorqueEffect {
         let share = all[1] / all[0].max(1e-12);
         let without: Vec<f64> = products.iter().map(|of| (all[1] - of[1]) / (all[0] - of[0]).max(1e-12)).collect();
         let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
-        TorqueEffect { size: rms(&should), share, std: jackknife(&without), left, wind_up }
+        TorqueEffect { size: rms(&should), share, std: jackknife(&without), left, wind_up, clearance }
     }
 
     fn is_certain(&self) -> bool {
@@ -223,7 +226,7 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
         return None;
     }
-    let freed = Freed::new(&rows, (nominal, table));
+    let freed = Freed::new(&rows, (nominal, table), &[]);
     let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
     let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
     let seen = |effect: &TorqueEffect| effect.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
@@ -319,8 +322,9 @@ pub(super) fn report(
     recording.faults.last_mut()
 }
 
-/// Refuses angles that are in degrees where radians are read, which no ratio shows: the error repeats in each turn of
-/// the generator in degrees and not in radians. A unit that the mapping says is believed.
+/// Refuses angles that are in degrees where radians are said: no ratio shows that, but wind-up, clearance and the
+/// largest wave of the model are then 180/π times what it says. A torque in another unit or of the other shaft moves
+/// the wind-up alone. A unit that the mapping says is believed.
 ///
 /// # Errors
 /// The angles look like degrees.
@@ -328,40 +332,35 @@ pub(crate) fn check_degrees(
     recording: &Recording,
     columns: &ColumnMap,
     nominal: &Nominal,
+    table: Option<&Table<'_>>,
 ) -> Result<(), MeasuredError> {
     let (generator, said) = columns.column(Quantity::Generator);
     let rows = Rows::new(&recording.sessions, nominal);
-    let (from, to) = least_and_most(rows.generator.iter().copied());
-    if said || to - from < MANY_TURNS * TAU * DEGREES {
+    if said || !rows.recorded.torque || nominal.wind_up_arcsec(1.0) == 0.0 {
         return Ok(());
     }
-    let sampled = Sampled::new(&rows, (nominal, None), SAMPLE, |places| {
-        let at = |column: &[f64]| places.iter().map(|k| column[*k]).collect();
-        let wind_up: Vec<f64> = rows.torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
-        let load = [at(&rows.torque), at(&wind_up), at(&PlayLaw::Held.flanks(&rows, &rows.torque, nominal))];
-        // Waves of the output in either unit, as many as a table has, and of the generator in one.
-        let output = [3.0, 4.0, 5.0, 6.0, 1.0 / DEGREES, 2.0 / DEGREES].map(|order| waves(order, &rows.output, places));
-        let generator = [1.0, 2.0].map(|order| waves(order, &rows.generator, places));
-        load.into_iter().chain(output.into_iter().chain(generator).flatten()).collect()
+    let effect = TorqueEffect::by(&Freed::new(&rows, (nominal, table), &[]), 1.0);
+    let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
+    let wave = nominal.harmonics.iter().max_by(by_size).map(|wave| {
+        // A load that is put on in steps while the generator turns a little looks like a wave: it goes first.
+        let wound = rows.torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
+        let further = [wound, PlayLaw::Held.flanks(&rows, &rows.torque, nominal)];
+        let Freed { sampled, error } = Freed::new(&rows, (nominal, table), &further);
+        let [sine, cosine] = waves(wave.order_per_generator_turn / DEGREES, &rows.generator, &sampled.places)
+            .map(|wave| sampled.free.freed(wave));
+        let [sine, cosine] = [(&sine, &cosine), (&cosine, &sine)].map(|(a, b)| share_beside(&error, a, b));
+        sine.hypot(cosine) / wave.amplitude_arcsec
     });
-    let orders = nominal.harmonics.iter().map(|harmonic| harmonic.order_per_generator_turn).chain([1.0, 2.0]);
-    let in_degrees = orders.flat_map(|order| waves(order / DEGREES, &rows.generator, &sampled.places));
-    let error = sampled.free.freed(sampled.at(&rows.error));
-    let [radians, degrees] = [rms(&error), rms(&sampled.free.beyond(in_degrees).freed(error.clone()))];
-    if degrees.powi(2) >= LEAVES * radians.powi(2) {
+    let clearance = (nominal.backlash_arcsec > 0.0).then_some(effect.clearance);
+    let degrees = |share: f64, [low, high]: [f64; 2]| (low * DEGREES..=high * DEGREES).contains(&share);
+    let mut others = [wave, clearance].into_iter().flatten().peekable();
+    let Some(other) = others.peek().copied() else { return Ok(()) };
+    if !degrees(effect.wind_up, OF_THIS_DRIVE) || !others.all(|share| degrees(share, AS_NOMINAL)) {
         return Ok(());
     }
-    let output = columns.column(Quantity::Output).0;
-    let seen = format!(
-        "beside load and waves of the output, waves of {generator} to 2 pi leave {radians:.0} arcsec rms, to 360 \
-         {degrees:.0}"
-    );
-    let why = "angles in degrees read as radians";
-    let readings = vec![
-        format!("--columns generator={generator}:deg,output={output}:deg"),
-        format!("--columns generator={generator}:rad,output={output}:rad if they are not"),
-    ];
-    Err(MeasuredError::of_file(&recording.file, &Refusal::OtherReading { seen, why, readings }))
+    let [generator, output] = [generator, columns.column(Quantity::Output).0].map(str::to_owned);
+    let why = Refusal::BothInDegrees { wind_up: effect.wind_up, other, generator, output };
+    Err(MeasuredError::of_file(&recording.file, &why))
 }
 
 #[cfg(test)]
@@ -461,7 +460,7 @@ mod tests {
     fn angles_in_degrees_are_refused_and_no_other_ratio_torque_or_unit_that_is_said() {
         let nominal = catalogue_drive();
         let map = ColumnMap::default();
-        let check = |recording: &Recording, map: &ColumnMap| check_degrees(recording, map, &nominal);
+        let check = |recording: &Recording, map: &ColumnMap| check_degrees(recording, map, &nominal, None);
         let in_degrees = |mut recording: Recording| {
             for session in &mut recording.sessions {
                 session.generator_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());

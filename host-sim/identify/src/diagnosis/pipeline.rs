@@ -339,7 +339,7 @@ pub fn parse_rows(
     }
     subject.take_away_known(&mut recording)?;
     let (nominal, table) = subject.against();
-    channels::check_degrees(&recording, columns, nominal)?;
+    channels::check_degrees(&recording, columns, nominal, table)?;
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
     if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
         recording.unusable = without_torque(&recording);
