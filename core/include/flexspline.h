@@ -14,6 +14,11 @@
 #define FLEXSPLINE_VERSION \
   FLEXSPLINE_TEXT_OF(FLEXSPLINE_VERSION_MAJOR) "." FLEXSPLINE_TEXT_OF(FLEXSPLINE_VERSION_MINOR) "." FLEXSPLINE_TEXT_OF(FLEXSPLINE_VERSION_PATCH)
 
+#ifndef FLEXSPLINE_STORE_WORDS
+// Eight-byte words of a `FlexsplineStore`, for any table. Fewer if the compiler is given what the environment of cargo had when it compiled the library.
+#define FLEXSPLINE_STORE_WORDS 1072
+#endif
+
 // There was no sample.
 #define FLEXSPLINE_FLAG_SAMPLE_LOST 1
 
@@ -49,9 +54,6 @@
 
 // The adjustment of the input was larger than any may be, and was taken at its largest: what made it is not sound.
 #define FLEXSPLINE_FLAG_BOUNDED 1024
-
-// Eight-byte words of a [`FlexsplineStore`].
-#define FLEXSPLINE_STORE_WORDS 1072
 
 // Eight-byte words of a [`FlexsplineJoint`].
 #define FLEXSPLINE_JOINT_WORDS 32

@@ -100,3 +100,34 @@ pub fn provenance() -> crate::write::Provenance<'static> {
         error_limit_rad: 0.02,
     }
 }
+
+/// A table of D, with a half-width of 1e-6 and a ripple of zeros.
+#[cfg(test)]
+pub fn image_of(torques: &[f32], mean_rad: &[f32], temperatures: &[f32], ripple_nodes: usize) -> Vec<u8> {
+    let zeros = std::vec![0.0; mean_rad.len() * ripple_nodes];
+    let data = crate::write::TableData {
+        drive: drive(),
+        torque_nodes_n_m: torques,
+        temperature_nodes_c: temperatures,
+        ripple_nodes,
+        mean_rad,
+        half_width_rad: &std::vec![1.0e-6; mean_rad.len()],
+        mean_ripple_rad: &zeros,
+        half_width_ripple_rad: &zeros,
+        generator_curve_rad: &[],
+        material_curve_rad: &[],
+        output_curve_rad: &[],
+        projection_worst_rad: 0.0,
+        projection_rms_rad: 0.0,
+    };
+    let ends = |axis: &[f32]| [axis[0], axis[axis.len() - 1]];
+    let provenance = crate::write::Provenance {
+        torque_range_n_m: ends(torques),
+        temperature_range_c: ends(temperatures),
+        error_limit_rad: 0.05,
+        ..provenance()
+    };
+    let mut image = std::vec![0; crate::table::image_bytes(torques.len(), temperatures.len(), ripple_nodes, [0; 3])];
+    crate::write::write_image(&data, &provenance, &mut image, id).unwrap();
+    image
+}

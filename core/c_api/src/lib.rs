@@ -130,8 +130,8 @@ pub const FLEXSPLINE_FLAG_OTHER_IMAGES: u16 = 512;
 /// The adjustment of the input was larger than any may be, and was taken at its largest: what made it is not sound.
 pub const FLEXSPLINE_FLAG_BOUNDED: u16 = 1024;
 
-/// Eight-byte words of a [`FlexsplineStore`].
-pub const FLEXSPLINE_STORE_WORDS: usize = 1072;
+/// Eight-byte words of a [`FlexsplineStore`], as the crate below was compiled; the header has 1072 for any table.
+pub const FLEXSPLINE_STORE_WORDS: usize = Store::ROOM;
 /// Eight-byte words of a [`FlexsplineJoint`].
 pub const FLEXSPLINE_JOINT_WORDS: usize = 32;
 /// Eight-byte words of a [`FlexsplineState`].
@@ -1123,7 +1123,7 @@ mod tests {
             assert_eq!(step(&mut o, &mut activation, &mut progress), FlexsplineStatus::Ok);
             seen[usize::from(progress)] += 1;
         }
-        assert!(seen[0] > 200 && seen[1] > 100 && seen[2] == 1, "{seen:?}");
+        assert!(seen[0] > 200 && seen[1] > 50 && seen[2] == 1, "{seen:?}");
         let mut at_once = made();
         assert_eq!(flexspline_store_activate(&mut *at_once.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
         let mut reports = [FlexsplineStoreReport::default(); 2];
@@ -1288,7 +1288,7 @@ mod tests {
         // SAFETY: inside the room; the store holds nothing there yet that is read before the call refuses.
         unsafe { moved.write(table) };
         assert_eq!(flexspline_store_check_images(inside, moved, 9), FlexsplineStatus::Ok, "beyond the store");
-        let moved = inside.cast::<FlexsplineImages>().wrapping_add(200);
+        let moved = inside.cast::<FlexsplineImages>().wrapping_add(100);
         unsafe { moved.write(table) };
         assert_eq!(flexspline_store_check_images(inside, moved, 9), Overlap);
     }

@@ -249,7 +249,7 @@ impl Activation {
     ) -> Result<Progress, ActivateError> {
         let found = self.found.as_mut().filter(|found| found.is_whole()).ok_or(ActivateError::Torn)?;
         if stage == ActivationStage::Clear {
-            store.know(&ImageSource { marks: found.source.marks & !ACTIVE, ..found.source });
+            store.source = [ImageSource { marks: found.source.marks & !ACTIVE, ..found.source }.sealed(); 2];
             self.stage = ActivationStage::Fill as u32;
             return Ok(Progress::Filling);
         }
@@ -262,15 +262,15 @@ impl Activation {
             let used = place < found.source.used as usize;
             let fresh = found.source.fresh(&images, place as u32, Strangers::NONE, [0; 2]).value;
             let value = if used { fresh } else { 0 };
-            store.first.put(place, value);
-            store.second.put(place, value);
+            store.first.set(place, value);
+            store.second.set(place, value);
         }
         found.filled = to as u32;
         found.sums = pair(found.sums());
         if to < all {
             return Ok(Progress::Filling);
         }
-        store.know(&found.source);
+        store.source = [found.source.sealed(); 2];
         store.next = 0;
         store.scrub = Scrub::START;
         store.damaged = Damaged::NONE;

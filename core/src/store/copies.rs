@@ -2,9 +2,21 @@
 
 use crate::table::{Doubt, words_from};
 
-/// Largest copy that fits into a [`Store`](crate::Store), words: 72 for the axes, curves, and for each torque node 3
-/// and its ripple.
-pub const STORE_WORDS: usize = 1024;
+/// Most eight-byte words of a [`Store`](crate::Store): what `FLEXSPLINE_STORE_WORDS` says where the crate is
+/// compiled, or the bound of any table: 1024 words of each copy.
+pub const STORE_ROOM: usize = match option_env!("FLEXSPLINE_STORE_WORDS") {
+    Some(text) => match usize::from_str_radix(text, 10) {
+        Ok(words @ 49..=1072) => words,
+        _ => panic!("FLEXSPLINE_STORE_WORDS is a number from 49 to 1072"),
+    },
+    None => 1072,
+};
+/// Those that hold no word of a table: 40 for what is known of it and the mark of C, and [`SLACK`].
+pub const BESIDE: usize = 40 + SLACK;
+/// Largest copy that fits into a store, words: 72 for the axes, curves, and for each torque node 3 and its ripple.
+pub const STORE_WORDS: usize = STORE_ROOM - BESIDE;
+/// Places of an accepted table are below; in a store for any table this shows it to the compiler.
+const MASK: usize = STORE_WORDS.next_power_of_two() - 1;
 /// Words that a read may take from the last place on.
 pub(super) const SLACK: usize = 8;
 
@@ -16,29 +28,21 @@ pub(super) struct Copied(pub [[u8; 4]; STORE_WORDS + SLACK]);
 impl Copied {
     pub const EMPTY: Self = Self([[0; 4]; STORE_WORDS + SLACK]);
 
-    // Places of an accepted table are below; the masks show that to the compiler.
-
     #[inline(always)]
     pub fn words<const N: usize>(&self, at: usize) -> [u32; N] {
-        let words = self.0.get(at & (STORE_WORDS - 1)..).and_then(|words| words.first_chunk::<N>());
+        let words = self.0.get(at & MASK..).and_then(|words| words.first_chunk::<N>());
         words.map_or([0; N], |words| words.map(u32::from_le_bytes))
     }
 
     #[inline(always)]
     pub fn halves<const N: usize>(&self, at: usize) -> [u32; N] {
-        words_from(self.0.as_flattened(), (at & (2 * STORE_WORDS - 1)).wrapping_mul(2))
+        words_from(self.0.as_flattened(), (at & (2 * MASK + 1)).wrapping_mul(2))
     }
 
-    /// As [`Self::set`], also behind the last place.
-    pub fn put(&mut self, at: usize, value: u32) {
-        if let Some(word) = self.0.get_mut(at) {
-            *word = value.to_le_bytes();
-        }
-    }
-
+    /// Writes a word, if there is a place for it.
     #[inline(always)]
     pub fn set(&mut self, at: usize, value: u32) {
-        if let Some(word) = self.0.get_mut(at & (STORE_WORDS - 1)) {
+        if let Some(word) = self.0.get_mut(at) {
             *word = value.to_le_bytes();
         }
     }

@@ -32,10 +32,9 @@ use crate::crc::{CRC_START, crc_word};
 use crate::drive::Drive;
 use crate::num;
 use crate::table::{
-    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, PointPlan, TableId, TorquePlace, Words, grid, word_at,
+    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, PointPlan, Table, TableId, TorquePlace, grid, word_at,
 };
-use crate::whole::pair;
-use copies::{Copied, SLACK, STORE_WORDS, agreed};
+use copies::{BESIDE, Copied, SLACK, STORE_ROOM, STORE_WORDS, agreed};
 use core::iter::once;
 use health::STORE_PAGES;
 use source::{ACTIVE, Fresh, IN_RANGE, ImageSource, SealedSource, Strangers, TORN};
@@ -93,7 +92,10 @@ impl Damaged {
     }
 }
 
-/// Two copies of a table at the temperature of the drive: 8.1 KiB, and 0.3 KiB beside.
+/// Two copies of a table at the temperature of the drive, for any table: 8.1 KiB, and 0.3 KiB beside.
+///
+/// Where all tables of a firmware are smaller, `FLEXSPLINE_STORE_WORDS` in the environment of cargo (as in `[env]` of
+/// `.cargo/config.toml`) says how many words of 8 bytes a store takes: [`Self::room_for`] the largest of them.
 ///
 /// Joints of one table and temperature share a store: their ticks borrow it one after another, the slow group runs once
 /// for all. Each then takes a [`JointState`](crate::JointState) of 184 bytes, and its settings where they are not a
@@ -137,8 +139,16 @@ impl Memory for Store {
 impl Store {
     /// Most words of a table that it holds.
     pub const WORDS: usize = STORE_WORDS;
+    /// Most eight-byte words that it takes.
+    pub const ROOM: usize = STORE_ROOM;
     /// Most pages of an image that it watches.
     pub const PAGES: usize = STORE_PAGES;
+
+    /// [`Self::ROOM`] of a store that holds this table and no larger one.
+    #[must_use]
+    pub fn room_for(table: &Table<'_>) -> usize {
+        (ImageSource::new(table).used as usize).saturating_add(BESIDE)
+    }
 
     /// A store without a table, all zeros: every step goes without correction.
     ///
@@ -206,15 +216,6 @@ impl Store {
         }
     }
 
-    /// Keeps both copies of what is known of a table.
-    fn know(&mut self, source: &ImageSource) {
-        let sums = pair(source.sums());
-        for sealed in &mut self.source {
-            sealed.source = *source;
-            sealed.sums = sums;
-        }
-    }
-
     /// The temperature that the copies follow, °C, within one pass. Call it in a slow rate group; false, and nothing
     /// changes, if it is not finite, the images disagree about where what is or are not those that were activated, or
     /// there is no table.
@@ -223,8 +224,7 @@ impl Store {
         let source = *self.source();
         let [first, second] = images.words;
         let known = images.at(source.seal_at as usize) == [source.seal; 2];
-        let active = source.marks & ACTIVE != 0;
-        if !temperature_c.is_finite() || !active || !known || !source::agree_on_temperature(first, second) {
+        if !temperature_c.is_finite() || !self.is_active() || !known || !source::agree_on_temperature(first, second) {
             return false;
         }
         self.source = [source.at_temperature(first, temperature_c).sealed(); 2];
@@ -277,10 +277,9 @@ impl Store {
                 continue;
             }
             found = true;
-            let fresh = self.fresh(&images.words, place as u32, strangers);
+            let fresh = self.source().fresh(&images.words, place as u32, strangers, self.damaged.pages());
             let fresh = if place < used { fresh } else { Fresh { place, value: 0, usable: true } };
-            let counter = if fresh.usable { &mut self.counters.words_mended } else { &mut self.counters.words_skipped };
-            *counter = counter.wrapping_add(1);
+            self.count(fresh.usable);
             if fresh.usable {
                 self.first.set(place, fresh.value);
                 self.second.set(place, fresh.value);
@@ -441,7 +440,7 @@ impl Store {
     fn renew(&mut self, images: &Images<'_>, strangers: Strangers) {
         let used = self.source().used as u32;
         let at = if self.next < used { self.next } else { 0 };
-        let fresh = self.fresh(&images.words, at, strangers);
+        let fresh = self.source().fresh(&images.words, at, strangers, self.damaged.pages());
         let ([a], [b]) = (self.first.words::<1>(fresh.place), self.second.words::<1>(fresh.place));
         if fresh.usable {
             self.first.set(fresh.place, fresh.value);
@@ -464,7 +463,7 @@ impl Store {
 
     /// Takes `words` words of the images into the CRC-32 of their pages: shows which of two images is damaged, and
     /// finds what both have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each
-    /// time: a word takes at most 733 instructions, and with 16 words every 100 ms the copies follow the temperature
+    /// time: a word takes at most 734 instructions, and with 16 words every 100 ms the copies follow the temperature
     /// within 6.4 s where the store is full.
     pub fn check_images(&mut self, images: &Images<'_>, words: usize) {
         self.mend_source();
@@ -473,12 +472,6 @@ impl Store {
             self.check(images);
             self.renew(images, strangers);
         }
-    }
-
-    /// Makes one word of the copies anew.
-    #[inline(always)]
-    fn fresh(&self, images: &[Words<'_>; 2], at: u32, strangers: Strangers) -> Fresh {
-        self.source().fresh(images, at, strangers, self.damaged.pages())
     }
 
     /// Takes one word of an image into the CRC-32 of its page.

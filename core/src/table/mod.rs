@@ -71,6 +71,8 @@ pub enum GeneratorKind {
 }
 
 impl GeneratorKind {
+    const ALL: [Self; 5] = [Self::Other, Self::TwoRoller, Self::FourRoller, Self::DoubleDisc, Self::Cam];
+
     /// The code in an image.
     #[must_use]
     pub const fn code(self) -> u8 {
@@ -79,15 +81,8 @@ impl GeneratorKind {
 
     /// From the code in an image.
     #[must_use]
-    pub const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Other),
-            1 => Some(Self::TwoRoller),
-            2 => Some(Self::FourRoller),
-            3 => Some(Self::DoubleDisc),
-            4 => Some(Self::Cam),
-            _ => None,
-        }
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(code as usize).copied()
     }
 }
 

@@ -19,11 +19,8 @@ pub fn bend(weight: f32, width: f32, [rise, below, above]: [f32; 3]) -> f32 {
 mod tests {
     use crate::fixture::{self, ARCSEC};
     use crate::slopes::{NodeSlope, Slopes};
-    use crate::table::image_bytes;
-    use crate::write::{Provenance, TableData, write_image};
     use crate::{Quality, Table};
     use proptest::prelude::*;
-    use std::vec;
     use std::vec::Vec;
 
     /// Nodes of one side, closer together towards the jump at 0.02.
@@ -37,31 +34,7 @@ mod tests {
     }
 
     fn image(nodes: &[f32], means: &[f32], temperatures: &[f32]) -> Vec<u8> {
-        let data = TableData {
-            drive: fixture::drive(),
-            torque_nodes_n_m: nodes,
-            temperature_nodes_c: temperatures,
-            ripple_nodes: 0,
-            mean_rad: means,
-            half_width_rad: &vec![1.0e-6; means.len()],
-            mean_ripple_rad: &[],
-            half_width_ripple_rad: &[],
-            generator_curve_rad: &[],
-            material_curve_rad: &[],
-            output_curve_rad: &[],
-            projection_worst_rad: 0.0,
-            projection_rms_rad: 0.0,
-        };
-        let ends = |axis: &[f32]| [axis[0], axis[axis.len() - 1]];
-        let provenance = Provenance {
-            torque_range_n_m: ends(nodes),
-            temperature_range_c: ends(temperatures),
-            error_limit_rad: 0.05,
-            ..fixture::provenance()
-        };
-        let mut image = vec![0; image_bytes(nodes.len(), temperatures.len(), 0, [0; 3])];
-        write_image(&data, &provenance, &mut image, fixture::id).unwrap();
-        image
+        fixture::image_of(nodes, means, temperatures, 0)
     }
 
     /// D that a table of `nodes` has for a curve of torque, at `places` in each interval: torque, D, curve.

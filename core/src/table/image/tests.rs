@@ -453,19 +453,7 @@ fn an_axis_of_one_node_holds_where_its_maker_says() {
 fn short_axes_give_flat_tables() {
     // One node alone, and an end of the axis that a jump cuts off.
     for nodes in [&[0.0][..], &[0.0, 2.0, 20.0, 40.0]] {
-        let flat = TableData {
-            torque_nodes_n_m: nodes,
-            temperature_nodes_c: &[20.0],
-            ripple_nodes: 0,
-            mean_rad: &[1.0e-3; 4][..nodes.len()],
-            half_width_rad: &[1.0e-4; 4][..nodes.len()],
-            mean_ripple_rad: &[],
-            half_width_ripple_rad: &[],
-            generator_curve_rad: &[],
-            output_curve_rad: &[],
-            ..data()
-        };
-        let image = write(&flat, &Provenance { torque_range_n_m: [0.0; 2], ..provenance() }).unwrap();
+        let image = fixture::image_of(nodes, &[1.0e-3; 4][..nodes.len()], &[20.0], 0);
         let table = Table::check(&image).unwrap();
         for torque in [-1.0, 0.0, 0.5, 1.9, 2.0, 7.0, 40.0, 50.0] {
             assert!((table.at(torque, 20.0).unwrap().mean_rad() - 1.0e-3).abs() < 2e-9, "{torque}");

@@ -86,6 +86,9 @@ fn header_comment(table: &MadeTable, mark: &str) -> String {
         info.temperature_nodes_c[info.temperature_nodes_c.len() - 1],
         info.projection_worst_arcsec
     ));
+    let read = flexspline::Table::check(&table.image);
+    let room = read.as_ref().map_or(flexspline::Store::ROOM, flexspline::Store::room_for);
+    line(format!("FLEXSPLINE_STORE_WORDS of a store that holds no larger one: {room}."));
     if let Some(completed) = &info.completed {
         line(format!("{}.", completed.in_words()));
     }

@@ -1,5 +1,5 @@
 //! Joints of one table that share a store: what their number takes of memory. `FLEXSPLINE_JOINTS` says how many when it
-//! is compiled, 1 without it.
+//! is compiled, 1 without it. The table is the largest that the store has room for.
 #![no_std]
 #![no_main]
 
@@ -22,12 +22,11 @@ const TICKS: u32 = 300;
 fn main() -> ! {
     let store = cortex_m::singleton!(: Store = Store::new());
     let states = cortex_m::singleton!(: [JointState; JOINTS] = [const { JointState::new() }; JOINTS]);
-    let [.., (_, [first, second])] = TABLES;
-    let images = Images::new(first, second);
     let (Some(store), Some(states)) = (store, states) else { finish(false) };
-    if store.activate(&images, JOINT.drive(), 21.0).is_err() {
-        finish(false);
-    }
+    let mut images = TABLES.map(|(_, [first, second])| Images::new(first, second)).into_iter().rev();
+    let Some(images) = images.find(|images| store.activate(images, JOINT.drive(), 21.0).is_ok()) else {
+        finish(false)
+    };
     let mut trajectories: [_; JOINTS] = core::array::from_fn(|number| Trajectory::new(number as u32 + 1));
     states.iter_mut().for_each(|state| _ = state.request(Mode::Tracking));
     let mut corrected = 0;
