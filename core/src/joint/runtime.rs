@@ -29,7 +29,7 @@
 
 use super::adjustment::bounded;
 use super::limits::{LEAST_TICK_S, Limits, SettingError, checked};
-use super::mode::{Mode, Overrun};
+use super::mode::Overrun;
 use super::signals::{Flags, Input, Output};
 use super::state::{
     BEND_TO_SIGN, CopyStatus, FINE, FIRST_IN_A_ROW, FLANK, FLANK_BACKWARD, FLANK_BEFORE, FLANK_FORWARD, FLANK_SHIFT,
@@ -622,7 +622,7 @@ mod tests {
     use crate::encoder::{EncoderSettings, EncoderWrap};
     use crate::fixture::{self, ARCSEC, LIMITS};
     use crate::joint::Adjustment;
-    use crate::joint::mode::ModeError;
+    use crate::joint::mode::{Mode, ModeError};
     use crate::joint::state::{MOST_FINE, RestoreError};
     use crate::table::Quality;
     use crate::upset::Upset;
