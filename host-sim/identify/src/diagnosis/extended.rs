@@ -142,6 +142,8 @@ impl FittedLaw {
 pub struct Extended {
     play: PlayLaw,
     scales: LawUnits,
+    /// Names of what floated, with the coefficients alone and beside the causes.
+    floating: Vec<String>,
     recalibrated: Vec<f64>,
     base: Vec<f64>,
     causes: Vec<FittedCause>,
@@ -234,7 +236,8 @@ impl Extended {
         let causes = start.iter().cloned().zip(fitted).zip(known).filter_map(cause).collect();
         let (play, scales) = (problem.on.base.law, problem.on.scales.clone());
         let (recalibrated, fineness) = (alone.solution.coefficients, problem.fineness);
-        Some(Extended { play, scales, recalibrated, base, causes, fineness })
+        let floating = problem.on.base.floating.iter().map(|floating| floating.name.clone()).collect();
+        Some(Extended { play, scales, floating, recalibrated, base, causes, fineness })
     }
 
     /// Causes of the model.
@@ -289,9 +292,14 @@ impl Extended {
     /// Recalibrated, extended, and each cause, row by row.
     pub(super) fn rows(&self, on: &Excitation<'_>) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
         let (mut recalibrated, mut extended) = (on.base.prediction.clone(), on.base.prediction.clone());
-        for (k, floating) in on.base.floating.iter().enumerate() {
-            add_scaled(&mut recalibrated, &floating.values, self.recalibrated.get(k).copied().unwrap_or(0.0));
-            add_scaled(&mut extended, &floating.values, self.base.get(k).copied().unwrap_or(0.0));
+        let mut known = self.floating.iter().zip(self.recalibrated.iter().zip(&self.base));
+        for floating in &on.base.floating {
+            // The order is the same, but rows may lack what others have, such as a change of flank.
+            let mut rest = known.clone();
+            let Some((_, (alone, beside))) = rest.find(|(name, _)| **name == floating.name) else { continue };
+            known = rest;
+            add_scaled(&mut recalibrated, &floating.values, *alone);
+            add_scaled(&mut extended, &floating.values, *beside);
         }
         let mut parts = Vec::new();
         let causes: Vec<Acting<'_>> = self

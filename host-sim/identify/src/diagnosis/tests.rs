@@ -511,6 +511,22 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
 }
 
 #[test]
+fn rows_without_a_change_of_flank_are_predicted_as_they_are_among_others() {
+    let (sessions, nominal) = (data(&[], 31), catalogue_drive());
+    let noise = super::Noise { white: 2.0, wander: 0.8, correlation_s: 12.0 };
+    let settings = (&Settings::default(), super::Fineness { stride: 1, noise, worth: 1.0 });
+    let extended = Extended::fit_to(&sessions, &[true; 5], &nominal, None, &[], settings).unwrap();
+    let rows = |of: fn(usize) -> f64| (0..200).map(of).collect::<Vec<f64>>();
+    let others = [30.0, nominal.temperature_c, 0.0].map(|value| vec![value; 200]);
+    let steady = Session::imagined(rows(|k| 1e5 + 0.01 * k as f64), rows(|k| 0.05 * k as f64), others);
+    let among = extended.predict(&[&sessions[..], &[steady.clone()]].concat(), &nominal, None).pop().unwrap();
+    let alone = extended.predict(&[steady], &nominal, None).pop().unwrap();
+    for (a, b) in alone.recalibrated_arcsec.iter().zip(&among.recalibrated_arcsec) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+}
+
+#[test]
 fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_where_there_is_none() {
     let drive = catalogue_drive();
     let rows_to_an_average = |sessions: &[Session]| {
