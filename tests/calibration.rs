@@ -187,3 +187,102 @@ fn a_motor_zero_that_is_off_by_whole_turns_is_reported() {
     let said = desk.line("replay --tables out/calibrated.fxt other.csv --out again").done().stdout;
     assert!(said.contains("it gains nothing here"), "{said}");
 }
+
+/// Value and standard deviation of the zero of each log but the first, deg, by its name.
+fn zeros(calibration: &Value) -> Vec<(String, [f64; 2])> {
+    let readings = calibration["readings"].as_array().unwrap().iter();
+    let zeros = readings.filter(|reading| reading["name"] == "zero").skip(1);
+    zeros
+        .map(|zero| {
+            let numbers = ["value", "std"].map(|key| zero[key].as_f64().unwrap());
+            (zero["file"].as_str().unwrap().to_owned(), numbers)
+        })
+        .collect()
+}
+
+/// Amplitude of the wave twice a generator turn in a table, arcsec.
+fn second_wave(image: &[u8]) -> f64 {
+    let table = Table::check(image).unwrap();
+    let mut sums = [0.0; 2];
+    for k in 0..20_000 {
+        let psi = TAU * 100.0 * (f64::from(k) + 0.5) / 20_000.0;
+        let generator = flexspline::GeneratorAngle::from_rad(psi).unwrap();
+        let error = table.steady_error_rad(generator, 5.0, 20.0, flexspline::Direction::Forward).unwrap();
+        let (sin, cos) = (2.0 * psi).sin_cos();
+        sums[0] += f64::from(error) * sin / 10_000.0;
+        sums[1] += f64::from(error) * cos / 10_000.0;
+    }
+    sums[0].hypot(sums[1]) * 1_296_000.0 / TAU
+}
+
+/// A motor encoder that counts from where it is switched on, beside an absolute output (made by `starts.py`): the logs
+/// are put on one zero, each zero is said, and the table has the waves as they are, with and without a table that was
+/// there before. A log of a joint that is another, whose zero nothing says, is left out by name.
+#[test]
+fn logs_of_other_starts_make_one_table() {
+    if std::process::Command::new("python3").arg("--version").output().is_err() {
+        println!("there is no python3 here: not tested");
+        return;
+    }
+    let desk = Desk::new();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/starts.py");
+    for seed in ["1", "2"] {
+        let made = std::process::Command::new("python3").args(["-B", script]).arg(desk.path(".")).arg(seed).output();
+        assert!(made.unwrap().status.success());
+        let calibrated = |logs: &str, known: &str| -> Value {
+            let line = format!("calibrate {logs} {known} --no-report --out out --json");
+            serde_json::from_str(&desk.line(&line).done().stdout).unwrap()
+        };
+        let table = || std::fs::read(desk.path("out/calibrated.fxt")).unwrap();
+        let check = |said: &Value, starts: &[(&str, f64)]| {
+            let found = zeros(said);
+            println!("{found:?}, wave of {:.2} arcsec", second_wave(&table()));
+            assert_eq!(found.len(), starts.len(), "{said}");
+            for ((file, [value, std]), (name, start)) in found.iter().zip(starts) {
+                let off = value - 360.0 * start;
+                assert!(file == name && off.abs() <= 2.0 && *std < 0.5, "{file}: {value} ± {std}");
+            }
+            assert!((second_wave(&table()) - 20.0).abs() <= 0.5, "{}", second_wave(&table()));
+        };
+        let three = calibrated("a.csv b.csv c.csv", "--ratio 100");
+        check(&three, &[("b.csv", 0.381), ("c.csv", 0.617)]);
+        assert!(three["held_out"]["rms_after_arcsec"].as_f64().unwrap() < 4.0, "{three}");
+        // The hysteresis of 10 arcsec is in no table.
+        let torque = &three["torque_from_wind_up"];
+        println!("{torque}");
+        let number = |key: &str| torque[key].as_f64().unwrap();
+        assert!(number("rms_n_m") < 0.04 * 40.0 && number("bias_n_m").abs() < 0.2, "{torque}");
+        assert!((0.93..=0.97).contains(&number("inside")), "{torque}");
+        // By `replay`, from a log of a later day, which starts as the second does.
+        let replayed = |log: &str| -> Vec<[f64; 4]> {
+            desk.line(&format!("replay {log} --tables out/calibrated.fxt --out again")).done();
+            let rows = std::fs::read_to_string(desk.path("again/replay.csv")).unwrap();
+            let columns: Vec<&str> = rows.lines().next().unwrap().split(',').collect();
+            let wanted = ["torque_n_m", "torque_from_wind_up_n_m"].map(str::to_owned).into_iter();
+            let ends = ["low", "high"].map(|end| format!("torque_from_wind_up_{end}_n_m"));
+            let wanted: Vec<String> = wanted.chain(ends).collect();
+            let at: Vec<usize> =
+                wanted.iter().map(|name| columns.iter().position(|column| column == name).unwrap()).collect();
+            let cells = rows.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>());
+            cells.map(|row| std::array::from_fn(|k| row[at[k]].parse().unwrap())).collect()
+        };
+        for log in ["later.csv", "b.csv"] {
+            let rows = replayed(log);
+            let count = rows.len() as f64;
+            let rms = (rows.iter().map(|[is, said, ..]| (said - is).powi(2)).sum::<f64>() / count).sqrt();
+            let inside = rows.iter().filter(|[is, _, low, high]| (low..=high).contains(&is)).count() as f64 / count;
+            println!("{log}: {rms:.3} N.m rms, {inside:.3} inside");
+            assert!(rms < 0.04 * 40.0 && (0.93..=0.97).contains(&inside), "{log}: {rms} {inside}");
+        }
+        std::fs::create_dir_all(desk.path("known")).unwrap();
+        std::fs::copy(desk.path("out/calibrated.fxt"), desk.path("known/cam.fxt")).unwrap();
+        let known = calibrated("b.csv a.csv c.csv", "--tables known");
+        check(&known, &[("a.csv", -0.381), ("c.csv", 0.617 - 0.381)]);
+        let turn = calibrated("a.csv turn.csv", "--ratio 100");
+        check(&turn, &[("turn.csv", 0.617)]);
+        assert!(turn["notes"].to_string().contains("the output reads +1 turns more in turn.csv"), "{turn}");
+        let without = calibrated("a.csv other.csv b.csv", "--ratio 100");
+        check(&without, &[("b.csv", 0.381)]);
+        assert!(without["notes"].to_string().contains("other.csv is left out"), "{without}");
+    }
+}

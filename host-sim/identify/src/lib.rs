@@ -2,8 +2,8 @@
 //!
 //! [`look`] says what a file holds, [`measurement`] reads it, [`calibrate`] makes the table of this unit, [`residual`]
 //! is the error less a model, [`diagnosis`] names causes ([`causes`]) and [`extension`] puts them into the model.
-//! [`synthesize`] makes rows with a hidden cause, [`replay`] runs the core over measured rows, [`nominal`] is a drive
-//! known from a catalogue alone.
+//! [`synthesize`] makes rows with a hidden cause, [`replay`] runs the core over measured rows, [`wind_up`] reads a
+//! torque from two encoders, [`nominal`] is a drive known from a catalogue alone.
 #![forbid(unsafe_code)]
 
 pub mod calibrate;
@@ -20,3 +20,4 @@ pub mod nominal;
 pub mod replay;
 pub mod residual;
 pub mod synthesize;
+pub mod wind_up;

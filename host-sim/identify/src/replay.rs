@@ -10,11 +10,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, check_ratio_of};
+use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, check_ratio_of, on_zero_of};
 use crate::known_rows::parse_known;
-use crate::measurement::{ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment};
+use crate::measurement::{
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment, quantile_of, white_noise,
+};
 use crate::misfit::{Misfit, TurnsOff, about_mean};
 use crate::nominal::Nominal;
+use crate::wind_up::WindUp;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::generator_of;
 
@@ -50,6 +53,12 @@ pub struct ReplayedRow {
     pub uncertainty_arcsec: f64,
     /// Quality of the prediction.
     pub quality: &'static str,
+    /// Torque that the wind-up says, with its least and its most, N m; of rows without a torque against their mean.
+    pub torque_from_wind_up_n_m: f64,
+    /// See above.
+    pub torque_from_wind_up_low_n_m: f64,
+    /// See above.
+    pub torque_from_wind_up_high_n_m: f64,
 }
 
 /// `summary.json` of a replay.
@@ -232,7 +241,7 @@ pub fn read(
     temperature_c: f64,
 ) -> Result<RowsRead, MeasuredError> {
     let nominal = Nominal::of_table(table);
-    rows_of(parse_known(file, bytes, columns, &nominal, Some(table))?, nominal.ratio, temperature_c)
+    rows_of(on_zero_of(table, parse_known(file, bytes, columns, &nominal, Some(table))?), nominal.ratio, temperature_c)
 }
 
 /// The rows of a recording, if a table can be played over them.
@@ -252,7 +261,9 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
     })?;
     recording.notes.extend(said);
     if recording.sessions.iter().all(|session| session.torque_n_m.is_none()) {
-        recording.notes.push("no torque: the table is read at 0 N.m".to_owned());
+        let what =
+            "no torque: the table is read at 0 N.m, and the torque from the wind-up counts from that of the mean row";
+        recording.notes.push(what.to_owned());
     }
     let rows = recording.sessions.iter().flat_map(|session| {
         let measured = session.states(temperature_c).zip(&session.error_rad);
@@ -280,7 +291,7 @@ pub(crate) fn by_core(table: &Table<'_>, rows: impl Iterator<Item = [f64; 3]>) -
 pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, ReplaySummary) {
     let mut by_quality = [0; 4];
     let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
-    let replayed: Vec<ReplayedRow> = rows
+    let mut replayed: Vec<ReplayedRow> = rows
         .iter()
         .zip(by_core(table, states))
         .map(|(row, said)| {
@@ -300,9 +311,13 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
                     Quality::Extrapolated => "extrapolated",
                     Quality::Disabled => "disabled",
                 },
+                torque_from_wind_up_n_m: f64::NAN,
+                torque_from_wind_up_low_n_m: f64::NAN,
+                torque_from_wind_up_high_n_m: f64::NAN,
             }
         })
         .collect();
+    read_torques(table, &mut replayed);
     let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
     let count = replayed.len().max(1) as f64;
     let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
@@ -330,6 +345,30 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
     };
     summary.of_rows(None, table);
     (replayed, summary)
+}
+
+/// Share of the rows whose error lies inside the half width that an interval of their torque is of, and that in
+/// standard deviations of noise.
+const INSIDE: f64 = 0.95;
+const OF_95: f64 = 1.96;
+
+/// Puts in the torques that the wind-up says, the mean residual taken for the zero of the output. The intervals are of
+/// what the table leaves of the rows; without a torque, of the noise of the rows and of what the table leaves of its
+/// samples.
+fn read_torques(table: &Table<'_>, rows: &mut [ReplayedRow]) {
+    let zero = rows.iter().map(|row| row.residual_arcsec).sum::<f64>() / rows.len().max(1) as f64;
+    let half_width_arcsec = if rows.iter().any(|row| row.torque_n_m != 0.0) {
+        quantile_of(&mut rows.iter().map(|row| (row.residual_arcsec - zero).abs()).collect::<Vec<f64>>(), INSIDE)
+    } else {
+        let errors: Vec<f64> = rows.iter().map(|row| row.measured_arcsec).collect();
+        OF_95 * white_noise([&errors[..]]).hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)
+    };
+    let mut wind_up = WindUp::new(table, PlayState::unknown());
+    for row in rows {
+        let [error, half_width] = [row.measured_arcsec - zero, half_width_arcsec].map(|arcsec| arcsec / ARCSEC_PER_RAD);
+        let torque = wind_up.read(row.generator_rad, error, row.temperature_c, half_width);
+        [row.torque_from_wind_up_n_m, row.torque_from_wind_up_low_n_m, row.torque_from_wind_up_high_n_m] = torque;
+    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{dead_zone_n_m, generator_of};
 use flexspline_identify::measurement::ColumnMap;
 use flexspline_identify::replay::{MeasuredRow, RowsOf, RowsRead, read, replay};
+use flexspline_identify::wind_up::WindUp;
 use flexspline_mechanics::drive::GeneratorKind;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
@@ -307,6 +308,46 @@ impl Table {
         for_rows(py, rows, |row| put(row, Approach::From(&play)))
     }
 
+    /// Torques by wind-up. With `direction` each row for itself, in steady motion; else in row order from `state`, which
+    /// stays.
+    #[expect(clippy::too_many_arguments, reason = "each is a column")]
+    fn torque(
+        &self,
+        py: Python<'_>,
+        generator_rad: In<'_>,
+        output_rad: In<'_>,
+        temperature_c: In<'_>,
+        half_width_rad: In<'_>,
+        direction: Option<In<'_, i8>>,
+        state: Option<&PlayState>,
+        mut torque_n_m: Out<'_, f64>,
+        mut low_n_m: Out<'_, f64>,
+        mut high_n_m: Out<'_, f64>,
+    ) -> PyResult<()> {
+        let table = self.table();
+        let generator = input("generator_rad", &generator_rad)?;
+        let rows = generator.len();
+        let reading = Column::new("output_rad", input("output_rad", &output_rad)?, rows)?;
+        let temperature = Column::new("temperature_c", input("temperature_c", &temperature_c)?, rows)?;
+        let half_width = Column::new("half_width_arcsec", input("half_width_arcsec", &half_width_rad)?, rows)?;
+        let torque = output("torque_n_m", &mut torque_n_m, rows)?;
+        let low = output("low_n_m", &mut low_n_m, rows)?;
+        let high = output("high_n_m", &mut high_n_m, rows)?;
+        angles("generator_rad", generator)?;
+        let ratio = table.drive().exact_ratio();
+        let sides = direction.as_ref().map(|direction| directions(input("direction", direction)?)).transpose()?;
+        let sides = sides.as_ref().map(|sides| Column::new("direction", sides, rows)).transpose()?;
+        let mut wind_up = WindUp::new(table, state.map_or(CoreState::unknown(), PlayState::get));
+        for_rows(py, rows, |row| {
+            if let Some(sides) = sides {
+                wind_up = WindUp::new(table, CoreState::after_motion(sides.at(row)));
+            }
+            let error = reading.at(row) - generator[row] / ratio;
+            [torque[row], low[row], high[row]] =
+                wind_up.read(generator[row], error, temperature.at(row), half_width.at(row));
+        })
+    }
+
     /// The core over measured rows, as the command `replay` runs it: the columns of `replay.csv` and the text of
     /// `summary.json`.
     fn replay<'py>(
@@ -382,6 +423,9 @@ impl Table {
             _ => 3u8,
         });
         columns.set_item("quality", quality.collect::<Vec<u8>>().into_pyarray(py))?;
+        columns.set_item("torque_from_wind_up_n_m", numbers(|row| row.torque_from_wind_up_n_m))?;
+        columns.set_item("torque_from_wind_up_low_n_m", numbers(|row| row.torque_from_wind_up_low_n_m))?;
+        columns.set_item("torque_from_wind_up_high_n_m", numbers(|row| row.torque_from_wind_up_high_n_m))?;
         Ok((columns, serde_json::to_string(&summary).map_err(bad)?))
     }
 }

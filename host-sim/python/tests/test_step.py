@@ -86,6 +86,24 @@ def test_inverse_brings_the_output_to_the_target(table: Table) -> None:
     assert (table.inverse(target, 0.0).uncertain).all(), "nothing is known of the play"
 
 
+def test_the_torque_that_winds_up_is_found(table: Table) -> None:
+    low, high = table.torque_range_n_m
+    generator = np.linspace(0.0, 300.0, 400)
+    torque = np.where(np.arange(400) % 2, 0.6 * high, 0.6 * low)
+    for way in (1, -1):
+        output = table.forward(generator, torque, direction=way).output_rad
+        said = table.torque(generator, output, direction=way, half_width_arcsec=1.0)
+        assert np.abs(said.torque_n_m - torque).max() < 1e-3 * (high - low)
+        assert ((said.low_n_m < torque) & (torque < said.high_n_m)).all()
+    # In their order, from anywhere in the play; a load that stays says where the output rests.
+    output = table.forward(generator, 0.6 * high).output_rad
+    assert np.abs(table.torque(generator, output).torque_n_m[50:] - 0.6 * high).max() < 1e-3 * (high - low)
+    # Inside the clearance any torque between its ends may be.
+    idle = table.torque(1.0, table.forward(1.0).output_rad)
+    assert idle.low_n_m[0] <= 0.0 <= idle.high_n_m[0]
+    assert np.isnan(table.torque([0.0, 1.0], [np.nan, 0.0]).torque_n_m).tolist() == [True, False]
+
+
 def test_replay_is_the_command(table: Table, image: Path, tmp_path: Path) -> None:
     generator, torque, temperature = (column[:4000] for column in motion(4000))
     torque, temperature = np.nan_to_num(torque), np.nan_to_num(temperature, posinf=20.0)

@@ -313,6 +313,16 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let _ = writeln!(text, "{}", held(c));
+    if let Some(torque) = c.torque_from_wind_up {
+        let _ = writeln!(
+            text,
+            "torque from the wind-up, where nothing was fitted: {:.2} N.m rms off that recorded, {:+.2} in the mean, \
+             {:.0} of 100 rows inside their interval",
+            torque.rms_n_m,
+            torque.bias_n_m,
+            100.0 * torque.inside
+        );
+    }
     let mut files = vec!["calibrated.fxt", "calibrated.h", "calibrated.rs", "calibration.json"];
     files.extend(with_page.then_some("report.html (for any browser)"));
     text + &format!("wrote to {}/: {}", out.display(), files.join(", "))

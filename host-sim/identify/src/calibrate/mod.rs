@@ -22,6 +22,7 @@ mod reading;
 mod rows;
 mod table;
 mod together;
+mod torque;
 mod zero;
 
 use flexspline::{ImageError, Table};
@@ -32,6 +33,7 @@ use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_m
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
+use flexspline_mechanics::drive::GeneratorKind;
 use folds::{Chosen, Folds};
 pub use interval::{ModelUncertainty, Node, RowNoise};
 use parts::usual_arcsec;
@@ -43,7 +45,8 @@ use reading::{DELAY, Delays, delay_note, play_of_a_millisecond};
 pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
 
-use together::Agreement;
+use together::{Agreement, Starts};
+pub use torque::TorqueFromWindUp;
 pub(crate) use zero::Alignment;
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
@@ -309,7 +312,10 @@ pub struct Calibration {
     /// the two apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub play_of_a_millisecond_arcsec: Option<f64>,
-    /// All that belongs to the reading. Generator angle zero of the table is where the logs read zero.
+    /// How good a torque from the wind-up would be, where one was recorded and the table gives way to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_from_wind_up: Option<TorqueFromWindUp>,
+    /// All that belongs to the reading. Generator angle zero of the table is where the first log reads zero.
     pub readings: Vec<Reading>,
     /// The parts.
     pub parts: Vec<PartSays>,
@@ -463,7 +469,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     prior.core_drive()?;
     let by_a_load_rad = if files.len() > 1 { LEAST_OF_OTHER_RATIO_RAD } else { 0.0 };
     let said = files.iter().map(|file| check_ratio_of(file, prior.nominal.ratio, by_a_load_rad));
-    let said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+    let mut said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     let parted: Vec<Recording>;
     let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
         parted = files.iter().flat_map(by_zeros).collect();
@@ -473,6 +479,15 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     };
     let mut recorded = Recorded::of(files, prior);
     let mut rows = settled(files, prior, &recorded);
+    let starts = Starts::of(&rows, &recorded, prior, files);
+    let zeros = starts.as_ref().map_or_else(Vec::new, |starts| starts.readings(files));
+    said.extend(starts.iter().flat_map(|starts| starts.notes(files)));
+    let on_one_zero = starts.map(|starts| starts.on_one(files, prior.nominal.ratio));
+    if let Some(files) = &on_one_zero {
+        recorded = Recorded::of(files, prior);
+        rows = settled(files, prior, &recorded);
+    }
+    let files = on_one_zero.as_deref().unwrap_or(files);
     let delays = Delays::of(rows.clone(), prior, &recorded);
     let at_one_instant = delays.as_ref().map(|delays| delays.taken_out(files, prior.nominal.ratio));
     if let Some(files) = &at_one_instant {
@@ -491,7 +506,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
     let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
     let made = fit_with_table(at_one_instant, prior, (&rows, &recorded))
-        .and_then(|made| report((at_one_instant, delays), (prior, alignment), &recorded, made, said));
+        .and_then(|made| report((at_one_instant, delays, zeros), (prior, alignment), &recorded, made, said));
     made.map_err(|error| with_faults(error, files, &notes))
 }
 
@@ -510,6 +525,39 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
         (first.faults, first.notes) = (file.faults.clone(), file.notes.clone());
     }
     pieces
+}
+
+/// With another zero a table leaves less than this share of the rms, … *Guess*: that of whole turns in `misfit`.
+const OTHER_START: f64 = 0.7;
+/// … and the generator is off by more than this beyond the interval, deg. *Guess*: a degree moves a table by little.
+const LEAST_START_DEG: f64 = 1.0;
+
+/// A log with each piece that has a zero of its own on the zero of a table, where its waves tell that. Whole turns stay:
+/// a motor that was homed in another turn did not start anew.
+pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
+    let prior = Prior::of_table(table, GeneratorKind::Cam);
+    let mut sessions = Vec::new();
+    for mut piece in by_zeros(&log) {
+        let recorded = Recorded::of(std::slice::from_ref(&piece), &prior);
+        let rows = settled(std::slice::from_ref(&piece), &prior, &recorded);
+        let found = (rows.rows.len() >= FEWEST_ROWS).then(|| zero::align(table, &rows, recorded.scales.friction_n_m));
+        let starts_elsewhere = |found: &Alignment| {
+            let off_deg = zero::within(found.generator_zero_deg, 360.0).abs();
+            let other = off_deg > found.generator_half_width_deg + LEAST_START_DEG;
+            found.told && other && found.left_after_arcsec < OTHER_START * found.left_before_arcsec
+        };
+        if let Some(found) = found.filter(starts_elsewhere) {
+            let zero_rad = found.generator_zero_deg.to_radians();
+            piece.sessions.iter_mut().for_each(|session| session.turn_generator(zero_rad, prior.nominal.ratio));
+            log.notes.push(format!(
+                "line {}: from here the generator reads {:+.2} ± {:.2} deg where that of the table is zero: the rows are \
+                 put on the zero of the table",
+                piece.sessions[0].line[0], found.generator_zero_deg, found.generator_half_width_deg
+            ));
+        }
+        sessions.extend(piece.sessions);
+    }
+    Recording { sessions, ..log }
 }
 
 /// The fit whose table can be made, and that table.
@@ -542,9 +590,10 @@ fn fit_with_table(
     })
 }
 
-/// Report on a table and the fit that it is of, to logs whose delays were taken out; `said` is noted of the ratio.
+/// Report on a table and the fit that it is of, to logs whose `zeros` and delays were taken out; `said` is noted of these
+/// and of the ratio.
 fn report(
-    (files, delays): (&[Recording], Option<Delays>),
+    (files, delays, zeros): (&[Recording], Option<Delays>, Vec<Reading>),
     (prior, alignment): (&Prior<'_>, Option<Alignment>),
     recorded: &Recorded,
     (fitted, made): (Fitted, MadeTable),
@@ -552,20 +601,19 @@ fn report(
 ) -> Result<Calibrated, CalibrationError> {
     let parts = fitted.judged(recorded, prior);
     let agreement = fitted.agreement();
-    let turned = agreement.as_ref().and_then(|agreement| {
-        together::generators_turned(agreement, &fitted.rows, (&fitted.open, &fitted.model), prior, files)
-    });
     let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
     let Fitted { rows, folds, model, held_out, .. } = fitted;
+    let torque_from_wind_up = TorqueFromWindUp::of(&rows, &folds, &model, prior).filter(|_| recorded.has_torque);
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = ByCore::of(files, &image, recorded);
     let mut readings = delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
+    let delay = delay_note(&readings, files.len());
+    readings.extend(zeros);
     let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, recorded, prior);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(said);
-    notes.extend(delay_note(&readings, files.len()));
-    // What is known by its angle needs no guess.
-    notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
+    notes.extend(delay);
+    notes.extend(agreement.and_then(|agreement| agreement.note(files)).into_iter().chain(unlike));
     notes.extend(remarks(prior, recorded, &model, play_of_a_millisecond_arcsec));
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
@@ -603,6 +651,7 @@ fn report(
         held_out,
         core,
         play_of_a_millisecond_arcsec,
+        torque_from_wind_up,
         readings,
         parts,
         nodes: known.nodes(),

@@ -23,8 +23,9 @@ pub(super) const DELAY: &str = "delay";
 /// A number of the reading, fitted with the parts of the table and not held by it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
-    /// `delay` (s, positive where the output of a row is older than its generator) or `offset` (arcsec, output less
-    /// generator over ratio less the table's error, mean over the file).
+    /// `delay` (s, positive where the output of a row is older than its generator), `offset` (arcsec, output less
+    /// generator over ratio less the table's error, mean over the file) or `zero` (deg of the generator, where that of
+    /// the first log is zero).
     pub name: &'static str,
     /// The log.
     #[serde(skip_serializing_if = "Option::is_none")]

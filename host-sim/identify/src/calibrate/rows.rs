@@ -345,6 +345,13 @@ impl Rows {
         if about > 0.0 { (explained / about).clamp(0.0, 1.0).sqrt() } else { 0.0 }
     }
 
+    /// Those of some logs.
+    pub(crate) fn of_logs(&self, logs: [usize; 2]) -> Rows {
+        let rows = self.rows.iter().filter(|row| logs.contains(&row.at.log)).copied().collect();
+        let (measured_means_arcsec, means_arcsec) = (self.measured_means_arcsec.clone(), self.means_arcsec.clone());
+        Rows { rows, measured_means_arcsec, means_arcsec, ..*self }
+    }
+
     /// With blocks of each log for folds: what is a log's own is not seen in the others.
     pub(crate) fn in_blocks(mut self) -> Rows {
         if self.folds != FoldKind::Blocks {

@@ -1,15 +1,18 @@
-//! Whether several logs are of one unit, read in one way.
+//! Whether several logs are of one unit, read in one way, and where their generators start.
 
 use std::f64::consts::TAU;
 
-use super::choose::PENALTIES;
+use super::choose::{LEAST_GAIN, PENALTIES};
 use super::folds::{Chosen, Folds, Row};
+use super::interval::OF_95;
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
-use super::rows::Rows;
+use super::reading::Reading;
+use super::rows::{Recorded, Rows};
 use super::zero::{PhaseSearch, within};
 use super::{Model, SAME_TORQUE};
 use crate::measurement::{Recording, least_and_most};
+use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Logs do not agree if fits to each alone leave less than this share of what one fit to all leaves, rms. A guess.
 const ALONE: f64 = 0.3;
@@ -104,8 +107,8 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
     })
 }
 
-/// A generator that is turned back by what is found has to leave less than this share of the squares, and no more than
-/// this share of the rms of each log alone: else it is not the zero alone that differs. Guesses.
+/// A generator that is turned back by what its waves say has to leave less than this share of the squares, and no more
+/// than this share of the rms of each log alone: else it is not the zero alone that differs. Guesses.
 const TURNED_BACK: f64 = 0.8;
 const AS_ALONE: f64 = 1.1;
 /// Whole turns are told if without them this multiple of the squares is left, at least. *Guess*.
@@ -113,63 +116,199 @@ const OTHER_TURN: f64 = 1.2;
 /// Logs that are turned, at most: pieces of one log with zeros of their own are many, and their generator is one.
 /// *Guess*.
 const MOST_LOGS: usize = 8;
-/// Rows that an angle is looked for with, and steps over a generator turn, coarse ones and the fine ones in each: an
-/// eighth of the wave of the highest order, and less.
+/// Rows that an angle is looked for with, and found with, and steps over a generator turn, coarse ones and the fine ones
+/// in each: an eighth of the wave of the highest order, and less.
 const ROWS_OF_A_SEARCH: usize = 300;
+const FOUND_WITH: usize = 3000;
 const STEPS_OF_A_TURN: f64 = 48.0;
 const FINE_STEPS: f64 = 8.0;
+/// An output that is off by this, rad, has another zero, or its generator has: beyond any clearance and wind-up. *Guess*.
+const OTHER_ZERO_RAD: f64 = 1500.0 / ARCSEC_PER_RAD;
+/// Fits to the output's angles that find a zero: the first with the waves where they are not.
+const FITS_TO_THE_OUTPUT: usize = 2;
 
-/// Says of logs that agree so far as `agreement` says whose generators have unlike zeros, and by how much.
-pub(super) fn generators_turned(
-    agreement: &Agreement,
-    rows: &Rows,
-    (parts, model): (&[PartName], &Model),
-    prior: &Prior<'_>,
-    files: &[Recording],
-) -> Option<String> {
-    let before = agreement.together_arcsec;
-    // All together never leave less than each alone, whichever way they are turned.
-    if files.len() > MOST_LOGS || agreement.alone_arcsec.powi(2) >= TURNED_BACK * before * before {
-        return None;
+/// Name of the reading of a zero.
+const ZERO: &str = "zero";
+
+/// Where the generator of a log starts, against the first log.
+struct Start {
+    /// Generator angle of the log where that of the first is zero, rad, with its standard deviation; none if the log
+    /// does not tell it.
+    zero_rad: Option<[f64; 2]>,
+    /// Whole turns of the output that it reads more than the first.
+    output_turns: f64,
+}
+
+/// Where the generators of several logs start.
+pub(super) struct Starts(Vec<Start>);
+
+impl Starts {
+    /// Of two logs and more, if one starts elsewhere than the first.
+    ///
+    /// An output that reads absolutely says where the generator was: the ratio times what it is off. Whether it reads so
+    /// is seen by what a fit to both logs leaves; else the waves say what they can.
+    pub(super) fn of(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>, files: &[Recording]) -> Option<Starts> {
+        let parts = recorded.shown(PartName::ALL, prior);
+        let pair =
+            |log: usize| Pair { rows: rows.of_logs([0, log]), log, parts: &parts, scales: &recorded.scales, prior };
+        let begins = |log: usize| files[log].sessions.first().map_or(0.0, |session| session.zero_off_rad);
+        let first = Start { zero_rad: Some([0.0; 2]), output_turns: 0.0 };
+        let logs = if files.len() > MOST_LOGS { 1 } else { files.len() };
+        let others = (1..logs).map(|log| pair(log).start(begins(log) - begins(0)));
+        let all: Vec<Start> = std::iter::once(first).chain(others).collect();
+        let elsewhere = |start: &Start| start.output_turns != 0.0 || start.zero_rad.is_none_or(|[zero, _]| zero != 0.0);
+        all.iter().any(elsewhere).then_some(Starts(all))
     }
-    let (folds, chosen) = by_log(rows, parts, &model.scales);
-    let first = Model { coefficients: folds.fit(&[0], &chosen, &[])?, chosen, scales: model.scales };
-    let (ratio, says) = (prior.nominal.ratio, |at: &State| first.says_arcsec(at, prior));
-    let in_a_turn = [PartName::OutputAngle, PartName::MaterialAngle].iter().all(|part| first.of(*part).is_none());
-    let repeats = TAU * if in_a_turn && prior.table.is_none() { 1.0 } else { ratio.abs() };
-    let step = TAU / STEPS_OF_A_TURN;
-    let turned_by = |log: usize| {
-        let of_log = rows.rows.iter().filter(move |row| row.at.log == log);
-        let friction = model.scales.friction_n_m;
-        let search = PhaseSearch::new(&says, ratio, (of_log, |row| row.measured_arcsec), friction, ROWS_OF_A_SEARCH);
-        let coarse = search.found(repeats, step, step / FINE_STEPS);
-        let [found, _] = search.close_to(coarse.zero_rad, step / FINE_STEPS);
-        // A curve that hardly goes beyond a turn tells no turns.
-        let in_a_turn = within(found, TAU);
-        let tells_turns = search.squares(in_a_turn) > OTHER_TURN * search.squares(found);
-        if tells_turns { within(found, repeats) } else { in_a_turn }
-    };
-    let turned: Vec<f64> = (0..files.len()).map(|log| if log == 0 { 0.0 } else { turned_by(log) }).collect();
-    let mut rows = rows.clone();
-    for row in &mut rows.rows {
-        row.at.generator_rad -= turned[row.at.log];
-        row.at.output_rad -= turned[row.at.log] / ratio;
-    }
-    let rows = rows.less(prior);
-    let Agreement { alone_arcsec, together_arcsec: after, .. } = Agreement::of(&rows, parts, &model.scales)?;
-    let is_near = after * after < TURNED_BACK * before * before && after < AS_ALONE * alone_arcsec;
-    is_near.then(|| {
-        let of = |(file, turned): (&Recording, &f64)| {
-            let turns = if turned.abs() > TAU { format!(" ({:+.2} turns)", turned / TAU) } else { String::new() };
-            format!("{:+.2} deg{turns} in {}", turned.to_degrees(), file.file)
+
+    /// The logs on the zero of the first, without those that do not tell theirs.
+    pub(super) fn on_one(&self, files: &[Recording], ratio: f64) -> Vec<Recording> {
+        let turned = |(file, start): (&Recording, &Start)| {
+            let [zero, _] = start.zero_rad?;
+            let mut file = file.clone();
+            file.sessions.iter_mut().for_each(|session| session.turn_generator(zero, ratio));
+            Some(file)
         };
-        let list: Vec<String> = files.iter().zip(&turned).skip(1).map(of).collect();
-        format!(
-            "the zero of the generator is not the same in all logs: against {} it reads {}; turned back they would \
-             leave {after:.2} arcsec rms instead of {before:.2}. Home it in the same place before each log, or give \
-             one log alone",
-            files[0].file,
-            list.join(", ")
-        )
-    })
+        files.iter().zip(&self.0).filter_map(turned).collect()
+    }
+
+    /// The zeros, deg of the generator.
+    pub(super) fn readings(&self, files: &[Recording]) -> Vec<Reading> {
+        let reading = |(file, start): (&Recording, &Start)| {
+            let [value, std] = start.zero_rad?.map(f64::to_degrees);
+            Some(Reading { name: ZERO, file: Some(file.file.clone()), value, std })
+        };
+        files.iter().zip(&self.0).filter_map(reading).collect()
+    }
+
+    /// Notes on them.
+    pub(super) fn notes(&self, files: &[Recording]) -> Vec<String> {
+        let name = |log: usize| files[log].file.as_str();
+        let others = || (1..).zip(&self.0[1..]);
+        let zeros = others().filter_map(|(log, start)| Some((log, start.zero_rad.filter(|[zero, _]| *zero != 0.0)?)));
+        let zeros = zeros.map(|(log, [zero, std])| {
+            let turns = if zero.abs() > TAU { format!(" ({:+.2} turns)", zero / TAU) } else { String::new() };
+            format!("{:+.2} ± {:.2} deg{turns} in {}", zero.to_degrees(), OF_95 * std.to_degrees(), name(log))
+        });
+        let zeros: Vec<String> = zeros.collect();
+        let put = format!(
+            "the zero of the generator is not the same in all logs: against {} it reads {}; they are put on that of the \
+             first",
+            name(0),
+            zeros.join(", ")
+        );
+        let turns = others().filter(|(_, start)| start.output_turns != 0.0).map(|(log, start)| {
+            format!("the output reads {:+.0} turns more in {} than in {}", start.output_turns, name(log), name(0))
+        });
+        let untold = others().filter(|(_, start)| start.zero_rad.is_none()).map(|(log, _)| {
+            format!(
+                "{} is left out: its generator starts elsewhere than that of {}, and neither the output nor the waves \
+                 say where; home it in the same place, or record more of its turn",
+                name(log),
+                name(0)
+            )
+        });
+        (!zeros.is_empty()).then_some(put).into_iter().chain(turns).chain(untold).collect()
+    }
+}
+
+/// The rows of the first log and of another.
+struct Pair<'a> {
+    rows: Rows,
+    log: usize,
+    parts: &'a [PartName],
+    scales: &'a Scales,
+    prior: &'a Prior<'a>,
+}
+
+impl Pair<'_> {
+    /// With the generator of the other turned back, and the angle of the output, which is the generator's over the
+    /// ratio.
+    fn turned(&self, zero_rad: f64) -> Rows {
+        let mut rows = self.rows.clone();
+        for row in rows.rows.iter_mut().filter(|row| row.at.log == self.log) {
+            row.at.generator_rad -= zero_rad;
+            row.at.output_rad -= zero_rad / self.prior.nominal.ratio;
+        }
+        rows.less(self.prior)
+    }
+
+    fn agreement(&self, zero_rad: f64) -> Option<Agreement> {
+        Agreement::of(&self.turned(zero_rad), self.parts, self.scales)
+    }
+
+    /// By how much the output of the other reads more than a fit to both says, rad.
+    fn output_off(&self, zero_rad: f64) -> Option<f64> {
+        let rows = self.turned(zero_rad);
+        let folds = Folds::new(&rows.rows, self.parts, self.scales, rows.means_arcsec.len(), false);
+        let chosen: Vec<Chosen> = self.parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect();
+        let zeros = folds.fit(&folds.all(), &chosen, &[])?;
+        let zero = |log: usize| rows.means_arcsec[log] + zeros[log];
+        Some((zero(self.log) - zero(0)) / ARCSEC_PER_RAD)
+    }
+
+    /// Where the other starts; `off_rad` was taken off its output when it was read.
+    fn start(&self, off_rad: f64) -> Start {
+        let ratio = self.prior.nominal.ratio;
+        let means = &self.rows.means_arcsec;
+        let mut off = off_rad + (means[self.log] - means[0]) / ARCSEC_PER_RAD;
+        let turns = |off: f64| ((off - within(off, TAU)) / TAU).round();
+        let elsewhere = within(off, TAU).abs() > OTHER_ZERO_RAD;
+        let same = Start { zero_rad: Some([0.0; 2]), output_turns: if elsewhere { 0.0 } else { turns(off) } };
+        let Some(stands) = self.agreement(0.0) else { return same };
+        let squares = |agreement: &Agreement| agreement.together_arcsec.powi(2);
+        // All together never leave less than each alone, whichever way they are turned.
+        let may_gain = |share: f64| stands.alone_arcsec.powi(2) < share * squares(&stands);
+        let gains = |zero: &f64, share: f64| {
+            let turned = self.agreement(*zero).filter(|turned| squares(turned) < share * squares(&stands));
+            turned.is_some_and(|turned| turned.together_arcsec < AS_ALONE * turned.alone_arcsec)
+        };
+        if !may_gain(1.0 - LEAST_GAIN) {
+            return same;
+        }
+        for _ in 0..FITS_TO_THE_OUTPUT {
+            let Some(by_fit) = self.output_off(-ratio * within(off, TAU)) else { return same };
+            off = off_rad + by_fit;
+        }
+        let step = TAU / STEPS_OF_A_TURN / FINE_STEPS;
+        let by_output = -ratio * within(off, TAU);
+        let absolute = by_output.abs() > step && gains(&by_output, 1.0 - LEAST_GAIN);
+        let by_waves = || self.by_waves().filter(|zero| gains(zero, TURNED_BACK));
+        let found = match absolute {
+            true => Some(by_output),
+            false if may_gain(TURNED_BACK) => by_waves(),
+            false => None,
+        };
+        let found = found.and_then(|zero| self.search(FOUND_WITH, |search| search.close_to(zero, step)));
+        let untold = elsewhere && !stands.agree();
+        match found {
+            Some(zero) if absolute => Start { zero_rad: Some(zero), output_turns: turns(off) },
+            None if untold => Start { zero_rad: None, ..same },
+            zero => Start { zero_rad: zero.or(same.zero_rad), ..same },
+        }
+    }
+
+    /// Lays the other log against a fit to the first.
+    fn search<T>(&self, most: usize, of: impl FnOnce(&PhaseSearch<'_>) -> T) -> Option<T> {
+        let (folds, chosen) = by_log(&self.rows, self.parts, self.scales);
+        let first = Model { coefficients: folds.fit(&[0], &chosen, &[])?, chosen, scales: *self.scales };
+        let says = |at: &State| first.says_arcsec(at, self.prior);
+        let of_log = self.rows.rows.iter().filter(|row| row.at.log == self.log);
+        let rows = (of_log, (|row| row.measured_arcsec) as fn(&Row) -> f64);
+        Some(of(&PhaseSearch::new(&says, self.prior.nominal.ratio, rows, self.scales.friction_n_m, most)))
+    }
+
+    /// The zero of the other that the waves say.
+    fn by_waves(&self) -> Option<f64> {
+        let in_a_turn = [PartName::OutputAngle, PartName::MaterialAngle].iter().all(|part| !self.parts.contains(part));
+        let repeats = TAU * if in_a_turn && self.prior.table.is_none() { 1.0 } else { self.prior.nominal.ratio.abs() };
+        let step = TAU / STEPS_OF_A_TURN;
+        self.search(ROWS_OF_A_SEARCH, |search| {
+            let coarse = search.found(repeats, step, step / FINE_STEPS);
+            let [found, _] = search.close_to(coarse.zero_rad, step / FINE_STEPS);
+            // A curve that hardly goes beyond a turn tells no turns.
+            let in_a_turn = within(found, TAU);
+            let tells_turns = search.squares(in_a_turn) > OTHER_TURN * search.squares(found);
+            if tells_turns { within(found, repeats) } else { in_a_turn }
+        })
+    }
 }

@@ -113,6 +113,12 @@ impl Session {
         self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
     }
 
+    /// Counts the generator's angle from another zero; the output stays as it was read.
+    pub(crate) fn turn_generator(&mut self, zero_rad: f64, ratio: f64) {
+        self.generator_rad.iter_mut().for_each(|psi| *psi -= zero_rad);
+        self.error_rad.iter_mut().for_each(|error| *error += zero_rad / ratio);
+    }
+
     /// Generator angle (rad), torque (N·m; 0 if not recorded) and temperature (°C; `temperature_c` if not) row by row.
     pub(crate) fn states(&self, temperature_c: f64) -> impl Iterator<Item = [f64; 3]> {
         let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);

@@ -23,7 +23,7 @@ from ._runs import (
     table_from_samples,
     tables,
 )
-from ._table import ARCSEC_PER_RAD, Answer, Command, PlayState, Prediction, Quality, Replay, Table
+from ._table import ARCSEC_PER_RAD, Answer, Command, PlayState, Prediction, Quality, Replay, Table, WindUp
 
 __all__ = [
     "ARCSEC_PER_RAD",
@@ -46,6 +46,7 @@ __all__ = [
     "Replay",
     "Simulation",
     "Table",
+    "WindUp",
     "__version__",
     "calibrate",
     "diagnose",

@@ -96,6 +96,18 @@ class Table:
         uncertainty_rad: NDArray[np.float32],
         quality: NDArray[np.uint8],
     ) -> None: ...
+    def torque(
+        self,
+        generator_rad: _Floats,
+        output_rad: _Floats,
+        temperature_c: _Floats,
+        half_width_rad: _Floats,
+        direction: NDArray[np.int8] | None,
+        state: PlayState | None,
+        torque_n_m: _Floats,
+        low_n_m: _Floats,
+        high_n_m: _Floats,
+    ) -> None: ...
     def replay(
         self, generator_rad: _Floats, error_arcsec: _Floats, torque_n_m: _Floats, temperature_c: _Floats
     ) -> tuple[dict[str, Any], str]: ...

@@ -147,6 +147,17 @@ class Command(Answer):
         return self.predicted_error_rad.astype(np.float64) * ARCSEC_PER_RAD
 
 
+class WindUp(Columns):
+    """Which torque winds a drive up as measured, row by row: what `Table.torque` gives. NaN where a reading is none."""
+
+    torque_n_m: FloatArray
+    """Torque at the output, N·m, within the range of the table."""
+    low_n_m: FloatArray
+    """The torque is no less, N·m; inside the play or a dead zone it may be far from ``torque_n_m``."""
+    high_n_m: FloatArray
+    """The torque is no more, N·m."""
+
+
 class Replay(Columns):
     """The core over measured rows: the columns of ``replay.csv``, but that ``quality`` holds `Quality` numbers."""
 
@@ -161,6 +172,8 @@ class Replay(Columns):
     """Measured less predicted, arcsec."""
     uncertainty_arcsec: FloatArray
     quality: NDArray[np.uint8]
+    torque_from_wind_up_n_m: FloatArray
+    """Torque that the wind-up says, N·m, with ``torque_from_wind_up_low_n_m`` and ``torque_from_wind_up_high_n_m``."""
     summary: Fields
     """``summary.json``: rms_measured_arcsec, rms_residual_arcsec, max_residual_arcsec, rows_by_quality and others."""
 
@@ -350,6 +363,30 @@ class Table:
         play = None if state is None else state._inner
         self._inner.inverse(target, torque, temperature, sides, play, *command.columns.values())
         return command
+
+    def torque(
+        self,
+        generator_rad: ArrayLike,
+        output_rad: ArrayLike,
+        temperature_c: ArrayLike = 20.0,
+        *,
+        half_width_arcsec: ArrayLike = 0.0,
+        direction: ArrayLike | None = None,
+        state: PlayState | None = None,
+    ) -> WindUp:
+        """Which torque winds the drive up from ``generator_rad`` to ``output_rad``, both on the zeros of the table.
+
+        With ``direction`` each row for itself, in steady motion that way; else in their order, from ``state`` or anywhere in the play.
+        ``half_width_arcsec`` is that of the readings and of the table: ``torque_from_wind_up.half_width_arcsec`` of a calibration.
+        """
+        reading = numbers("output_rad", output_rad)
+        generator, half_width = spread(numbers("generator_rad", generator_rad), reading.size), numbers("half_width_arcsec", half_width_arcsec)
+        temperature = numbers("temperature_c", temperature_c)
+        said = WindUp({name: np.empty(generator.size) for name in ("torque_n_m", "low_n_m", "high_n_m")})
+        play = None if state is None else state._inner
+        sides = self._sides(direction, state)
+        self._inner.torque(generator, reading, temperature, half_width / ARCSEC_PER_RAD, sides, play, *said.columns.values())
+        return said
 
     def replay(
         self,
