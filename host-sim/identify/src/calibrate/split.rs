@@ -178,7 +178,7 @@ impl Waves<'_> {
                 if amplitude < own.min(self.known.noise.rms_arcsec) {
                     continue;
                 }
-                let of_gear = self.of_gear(encoder, order);
+                let of_gear = self.of_gear(encoder, order).map(|most| most.min(amplitude));
                 let half_width = own.hypot(of_gear.as_ref().copied().unwrap_or(amplitude));
                 let is_encoders = of_gear.is_ok() && half_width <= MOST_OF_ANOTHER * amplitude;
                 let why = match &of_gear {
@@ -247,7 +247,7 @@ impl Calibration {
                     let angle = f64::from(share.order) * (reading_rad - zero_rad);
                     share.amplitude_arcsec * (angle - share.phase_deg.to_radians()).cos()
                 };
-                let error_arcsec = factor * part.shares.iter().map(wave).sum::<f64>();
+                let error_arcsec = part.shares.iter().fold(0.0, |sum, share| sum + factor * wave(share));
                 let in_counts = |counts: f64| (-error_arcsec / ARCSEC_PER_RAD / TAU * counts).round() as i64;
                 EncoderEntry {
                     entry,
