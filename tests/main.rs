@@ -19,6 +19,7 @@ mod completed_from_data_sheet;
 mod contact_patch;
 mod docs_commands;
 mod element_patch_and_rates;
+mod encoder_or_gear;
 mod fast_equals_reference;
 mod fem_causes;
 mod fmu;

@@ -12,7 +12,8 @@ use super::{Failure, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
-    Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, one_in, plan,
+    Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, Split, calibrate, calibrate_and_split, one_in,
+    plan,
 };
 use flexspline_identify::diagnosis::Subject;
 use flexspline_identify::extension::Model;
@@ -60,6 +61,14 @@ pub(super) struct Calibrate {
     columns: LogOptions,
     #[command(flatten)]
     bench: BenchOptions,
+    /// Also split the error into what the output encoder, the generator encoder and the gear have of it: gear.fxt,
+    /// encoder_output.csv and encoder_generator.csv, which add up to calibrated.fxt
+    #[arg(long, conflicts_with = "plan")]
+    split: bool,
+    /// Entries in the tables of the encoders, and counts in a turn of the output's, negative if they fall as its angle
+    /// rises: 32:4096 [default: 256, counts of the output column]
+    #[arg(long, value_name = "N[:COUNTS]", allow_hyphen_values = true, requires = "split", value_parser = encoder_table)]
+    encoder_table: Option<(usize, Option<f64>)>,
     /// Do not write report.html
     #[arg(long)]
     no_report: bool,
@@ -115,6 +124,21 @@ impl BenchOptions {
     }
 }
 
+/// Entries of an encoder's table, unless they are said: what controllers hold that have a table of their own.
+const USUAL_ENTRIES: usize = 256;
+
+/// Reads `N` or `N:COUNTS`.
+fn encoder_table(text: &str) -> Result<(usize, Option<f64>), String> {
+    let (entries, counts) = text.split_once(':').map_or((text, None), |(entries, counts)| (entries, Some(counts)));
+    let entries = entries.parse().ok().filter(|entries| (2..=65_536).contains(entries));
+    let counts = counts.map(|counts| counts.parse().ok().filter(|counts: &i64| (2..=1 << 40).contains(&counts.abs())));
+    match (entries, counts) {
+        (Some(entries), None) => Ok((entries, None)),
+        (Some(entries), Some(Some(counts))) => Ok((entries, Some(counts as f64))),
+        _ => Err("allowed: 2 to 65536 entries, as in 32, or with the counts in a turn, as in 32:4096".to_owned()),
+    }
+}
+
 /// First column of plan.csv.
 const PLAN_BEGINS: &str = "log";
 
@@ -143,6 +167,15 @@ impl Calibrate {
         if !self.no_report {
             report::before(context, out, "calibrate", None);
         }
+        let (entries, counts) = self.encoder_table.unwrap_or((USUAL_ENTRIES, None));
+        let counts = counts.or_else(|| map.counts_of_output());
+        if self.encoder_table.is_some() && counts.is_none() {
+            return Err(Failure::BadInput(format!(
+                "--encoder-table: found {entries} without counts in a turn, which --columns does not say of the output; \
+                 allowed: {entries}:COUNTS"
+            )));
+        }
+        let calibrate = if self.split { calibrate_and_split } else { calibrate };
         let mut made = calibrate(&files, &prior).map_err(|error| self.failed(&error))?;
         made.calibration.command.clone_from(&context.command);
         made.table.info.command.clone_from(&context.command);
@@ -151,6 +184,12 @@ impl Calibrate {
         put("calibrated.fxt", &made.table.image)?;
         put("calibrated.h", c_header(&made.table).as_bytes())?;
         put("calibrated.rs", rust_source(&made.table).as_bytes())?;
+        if let Some(gear) = &made.gear {
+            put("gear.fxt", &gear.image)?;
+        }
+        for (encoder, table) in made.calibration.encoder_tables(entries, counts) {
+            outputs.csv(&out.join(format!("{encoder}.csv")), table)?;
+        }
         outputs.json(&out.join("calibration.json"), &made.calibration)?;
         if !self.no_report {
             report::write(&calibration_report::page(&made), out, &mut outputs)?;
@@ -264,6 +303,23 @@ fn held(c: &Calibration) -> String {
     text
 }
 
+/// Whose error it is, for a reader.
+fn split_text(split: &Split) -> String {
+    let mut text = "of the error, arcsec rms over the rows, at the output:\n".to_owned();
+    for part in &split.parts {
+        let _ = writeln!(text, "  {:<17} {:.2} ± {:.2}", part.of, part.rms_arcsec, part.half_width_arcsec);
+        for w in &part.shares {
+            let [least, most] = w.of_encoder.map(|share| 100.0 * share);
+            let _ = writeln!(
+                text,
+                "    {} order {}: {:.2} arcsec, {least:.0} to {most:.0} % of it the encoder's: {}",
+                w.turn, w.order, w.amplitude_arcsec, w.why
+            );
+        }
+    }
+    text
+}
+
 fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
     let Calibration { held_out, core, parts, .. } = &made.calibration;
     let c = &made.calibration;
@@ -324,6 +380,10 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         );
     }
     let mut files = vec!["calibrated.fxt", "calibrated.h", "calibrated.rs", "calibration.json"];
+    if let Some(split) = &c.split {
+        text += &split_text(split);
+        files.extend(["gear.fxt", "encoder_output.csv", "encoder_generator.csv"]);
+    }
     files.extend(with_page.then_some("report.html (for any browser)"));
     text + &format!("wrote to {}/: {}", out.display(), files.join(", "))
 }

@@ -189,7 +189,7 @@ fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f64, Vec<f64>
             let largest = torque(if high.abs() >= low.abs() { high } else { low });
             over("temperature_c", vec![cold, warm], &|temperature_c| State { temperature_c, ..largest })
         }
-        PartName::ReadingDelay(_) => Vec::new(),
+        PartName::ReadingDelay(_) | PartName::WavesByLoad | PartName::WavesByFlank => Vec::new(),
     }
 }
 
@@ -246,7 +246,7 @@ pub struct ModelUncertainty {
     means: Vec<f64>,
     /// Error that stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the
     /// fit.
-    of_no_part_arcsec: f64,
+    pub(super) of_no_part_arcsec: f64,
     /// Noise of the rows.
     pub noise: RowNoise,
 }
@@ -312,9 +312,15 @@ impl ModelUncertainty {
     /// log, which has a delay; without one, that of both angles at one instant.
     #[must_use]
     pub fn half_width_arcsec(&self, at: &State) -> f64 {
+        OF_95 * (self.variance_of(at, |_| true) + self.of_no_part_arcsec.powi(2)).sqrt()
+    }
+
+    /// Variance of the sum of some coefficients at a state, about its mean over the rows, arcsec².
+    pub(super) fn variance_of(&self, at: &State, has: impl Fn(usize) -> bool) -> f64 {
         let mut x = row(&self.parts, at, &self.model.scales);
-        x.iter_mut().zip(&self.means).for_each(|(x, mean)| *x -= mean);
-        OF_95 * (variance(&self.covariance, &x) + self.of_no_part_arcsec.powi(2)).sqrt()
+        let columns = x.iter_mut().zip(&self.means).enumerate();
+        columns.for_each(|(k, (x, mean))| *x = if has(k) { *x - mean } else { 0.0 });
+        variance(&self.covariance, &x)
     }
 
     /// Mean square root of the half widths at some states, arcsec.
@@ -326,8 +332,13 @@ impl ModelUncertainty {
 
     /// Standard deviation of the delay of a log, as a number of its column.
     pub(super) fn std_of_delay(&self, log: usize) -> Option<f64> {
-        let at = self.parts.iter().position(|part| *part == PartName::ReadingDelay(log))?;
-        let place = width_of(&self.parts[..at]);
+        self.std_of(PartName::ReadingDelay(log), 0)
+    }
+
+    /// Standard deviation of a coefficient of a part.
+    pub(super) fn std_of(&self, part: PartName, coefficient: usize) -> Option<f64> {
+        let at = self.parts.iter().position(|other| *other == part)?;
+        let place = width_of(&self.parts[..at]) + coefficient;
         Some(self.covariance[place * width_of(&self.parts) + place].sqrt())
     }
 

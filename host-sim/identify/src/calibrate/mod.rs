@@ -20,6 +20,7 @@ mod plan;
 mod prior;
 mod reading;
 mod rows;
+mod split;
 mod table;
 mod together;
 mod torque;
@@ -41,9 +42,11 @@ pub use parts::{PartName, Scales, State};
 pub use plan::{Bench, Pass, Planned, plan};
 pub use prior::Prior;
 pub use reading::{ByCore, Reading};
-use reading::{DELAY, Delays, delay_note, play_of_a_millisecond};
+use reading::{DELAY, Delays, OFFSET, delay_note, play_of_a_millisecond};
 pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
+use split::Waves;
+pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
 
 use together::{Agreement, Starts};
 pub use torque::TorqueFromWindUp;
@@ -333,6 +336,9 @@ pub struct Calibration {
     /// Phase of the table that was known before, if one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<Alignment>,
+    /// What the encoders and the gear have of it, if that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split: Option<Split>,
     /// Generator turns for one of the output.
     pub ratio: f64,
     /// Identity of the table.
@@ -367,6 +373,8 @@ pub struct Calibrated {
     pub calibration: Calibration,
     /// The table.
     pub table: MadeTable,
+    /// That of the gear alone, if the error was split.
+    pub gear: Option<MadeTable>,
     /// How well it is known.
     pub known: ModelUncertainty,
     /// Rows for a picture: output angle (rad), measured and left by the model (arcsec).
@@ -463,6 +471,18 @@ fn given_twice(files: &[Recording]) -> Option<[&str; 2]> {
 /// # Errors
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
+    calibrated(files, prior, false)
+}
+
+/// The same with its error [split](Split) into what the encoders and the gear have of it.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_and_split(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
+    calibrated(files, prior, true)
+}
+
+fn calibrated(files: &[Recording], prior: &Prior<'_>, split: bool) -> Result<Calibrated, CalibrationError> {
     if let Some([one, other]) = given_twice(files) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
@@ -506,7 +526,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
     let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
     let made = fit_with_table(at_one_instant, prior, (&rows, &recorded))
-        .and_then(|made| report((at_one_instant, delays, zeros), (prior, alignment), &recorded, made, said));
+        .and_then(|made| report((at_one_instant, delays, zeros), (prior, alignment), &recorded, made, (said, split)));
     made.map_err(|error| with_faults(error, files, &notes))
 }
 
@@ -591,13 +611,13 @@ fn fit_with_table(
 }
 
 /// Report on a table and the fit that it is of, to logs whose `zeros` and delays were taken out; `said` is noted of these
-/// and of the ratio.
+/// and of the ratio, and the error is split if that was asked.
 fn report(
     (files, delays, zeros): (&[Recording], Option<Delays>, Vec<Reading>),
     (prior, alignment): (&Prior<'_>, Option<Alignment>),
     recorded: &Recorded,
     (fitted, made): (Fitted, MadeTable),
-    said: Vec<String>,
+    (said, split): (Vec<String>, bool),
 ) -> Result<Calibrated, CalibrationError> {
     let parts = fitted.judged(recorded, prior);
     let agreement = fitted.agreement();
@@ -623,8 +643,11 @@ fn report(
     let left_out_arcsec = held_out.rms_after_arcsec;
     let correlation = rows.load_with_output_angle();
     let beside = collinear(&rows, &model, correlation);
-    let known = ModelUncertainty::of(&rows.rows, (&model, &beside), &of_columns, recorded.coarse_rad, left_out_arcsec)
-        .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
+    let known_with = |beside: &[(PartName, f64)]| {
+        ModelUncertainty::of(&rows.rows, (&model, beside), &of_columns, recorded.coarse_rad, left_out_arcsec)
+            .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))
+    };
+    let known = known_with(&beside)?;
     // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
     // paces that were recorded.
     let at_rest = |at: State| State { speed_rad_s: 0.0, ..at };
@@ -637,6 +660,15 @@ fn report(
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
     readings.extend(offsets(files, &rows, &model, known.noise));
+    let of_whom = |changes: Vec<(PartName, f64)>| {
+        let changing = &known_with(&[&beside[..], &changes].concat())?;
+        let (model, known, changes, has_torque) = (&model, &known, &changes, recorded.has_torque);
+        let states: Vec<State> = some_rows().map(as_fitted).collect();
+        let (split, gear) = Waves { model, known, changing, changes, has_torque }.split(&states, prior);
+        Ok::<_, CalibrationError>((split, table::make(prior, &gear, recorded)?))
+    };
+    let changes = split.then(|| split::recorded_changes(&rows, &model, prior, known.noise.rms_arcsec));
+    let (split, gear) = changes.map(of_whom).transpose()?.unzip();
     let calibration = Calibration {
         schema_version: 1,
         files: files.iter().map(|file| file.file.clone()).collect(),
@@ -660,6 +692,7 @@ fn report(
         half_width_as_recorded_arcsec,
         half_width_at_another_pace_arcsec,
         alignment,
+        split,
         ratio: prior.nominal.ratio,
         table_id: made.info.table_id.clone(),
         image_bytes: made.image.len(),
@@ -670,7 +703,7 @@ fn report(
         notes,
         command: String::new(),
     };
-    Ok(Calibrated { calibration, table: made, known, shown })
+    Ok(Calibrated { calibration, table: made, gear, known, shown })
 }
 
 /// What keeps a table from being made, with what was noticed of the units and signs of the logs: before what it may be
@@ -722,7 +755,7 @@ fn offsets(files: &[Recording], rows: &Rows, model: &Model, noise: RowNoise) -> 
         sums[row.at.log].1 += 1.0;
     }
     let offset = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| Reading {
-        name: "offset",
+        name: OFFSET,
         file: Some(file.file.clone()),
         value: mean + sum / f64::max(count, 1.0),
         std: (noise.of_a_row() / f64::max(count, 1.0)).sqrt(),

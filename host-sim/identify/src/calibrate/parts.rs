@@ -27,6 +27,11 @@ pub enum PartName {
     /// One angle is read after the other in this log: what goes with the speed. It is the logger's, and no table holds
     /// it.
     ReadingDelay(usize),
+    /// All waves of generator and output in proportion to the load: none is fitted, all are asked of what is an
+    /// encoder's, which knows no load.
+    WavesByLoad,
+    /// The same by the flank that bears.
+    WavesByFlank,
 }
 
 impl Serialize for PartName {
@@ -59,6 +64,8 @@ impl PartName {
             PartName::OutputAngle => "output_angle",
             PartName::Temperature => "temperature",
             PartName::ReadingDelay(_) => "reading_delay",
+            PartName::WavesByLoad => "waves_by_load",
+            PartName::WavesByFlank => "waves_by_flank",
         }
     }
 }
@@ -160,7 +167,7 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             to.push(load / (load.abs() + LIGHT_LOAD));
         }
         PartName::Play => {
-            let flank = if at.torque_n_m.abs() > scales.friction_n_m { at.torque_n_m.signum() } else { lag };
+            let flank = flank(at, scales);
             // The lag without load, the lag under the largest, and the flank: none of them is negative.
             to.extend([lag * (1.0 - load.abs()), lag * load.abs(), flank]);
         }
@@ -176,7 +183,20 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             to.push(at.speed_rad_s / scales.speed_rad_s.max(f64::MIN_POSITIVE));
         }
         PartName::ReadingDelay(_) => to.push(0.0),
+        PartName::WavesByLoad | PartName::WavesByFlank => {
+            let by_load = part == PartName::WavesByLoad;
+            let factor = if by_load { scales.torque_share(at.torque_n_m) } else { flank(at, scales) };
+            let begin = to.len();
+            waves(at.generator_rad, GENERATOR_ORDERS, to);
+            waves(at.output_rad, OUTPUT_ORDERS, to);
+            to[begin..].iter_mut().for_each(|wave| *wave *= factor);
+        }
     }
+}
+
+/// The flank that bears: 1 where the load turns the output forward, or it lags without one; else -1.
+pub(super) fn flank(at: &State, scales: &Scales) -> f64 {
+    if at.torque_n_m.abs() > scales.friction_n_m { at.torque_n_m.signum() } else { -at.way }
 }
 
 /// The weights of a part's columns in its penalty.
@@ -194,6 +214,9 @@ pub(super) fn weights(part: PartName) -> Vec<f64> {
         PartName::GeneratorAngle | PartName::MaterialAngle => of_waves(GENERATOR_ORDERS),
         PartName::ToothPitch => of_waves(TOOTH_ORDERS),
         PartName::OutputAngle => of_waves(OUTPUT_ORDERS),
+        PartName::WavesByLoad | PartName::WavesByFlank => {
+            vec![1.0; 2 * usize::from(GENERATOR_ORDERS + OUTPUT_ORDERS)]
+        }
     }
 }
 
@@ -223,7 +246,11 @@ pub(super) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
     match part {
         PartName::WindUp => BENDS * 200.0,
         PartName::Play => HALF_A_LOST_MOTION_ARCSEC,
-        PartName::GeneratorAngle | PartName::MaterialAngle | PartName::OutputAngle => 15.0,
+        PartName::GeneratorAngle
+        | PartName::MaterialAngle
+        | PartName::OutputAngle
+        | PartName::WavesByLoad
+        | PartName::WavesByFlank => 15.0,
         PartName::ToothPitch => 3.0,
         PartName::Temperature => 10.0,
         PartName::ReadingDelay(_) => expected_arcsec(part, scales, &[]),

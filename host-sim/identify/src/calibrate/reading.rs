@@ -19,6 +19,8 @@ const UNTOLD: f64 = 0.25;
 
 /// Name of the reading of a delay.
 pub(super) const DELAY: &str = "delay";
+/// Name of the zero of the output.
+pub(super) const OFFSET: &str = "offset";
 
 /// A number of the reading, fitted with the parts of the table and not held by it.
 #[derive(Debug, Clone, PartialEq, Serialize)]

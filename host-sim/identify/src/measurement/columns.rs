@@ -212,6 +212,13 @@ impl ColumnMap {
             .map_or((quantity.default_column().0, false), |given| (&given.column, given.reading.is_some()))
     }
 
+    /// Counts in a turn of the output's encoder, negative where they fall as its angle rises, if its unit says so.
+    #[must_use]
+    pub fn counts_of_output(&self) -> Option<f64> {
+        let reading = self.given(Quantity::Output)?.reading?;
+        (reading.unit == Unit::Count).then(|| reading.gain.recip())
+    }
+
     /// The rate of rows, Hz, if it was said.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         self.rate_hz
