@@ -66,14 +66,7 @@ impl Gram {
     /// Products of `columns`, whose last is the data, over a range of rows.
     #[must_use]
     pub fn of(columns: &[&[f64]], range: Range<usize>) -> Gram {
-        let size = columns.len();
-        let mut products = products(columns, columns, range, true);
-        for i in 0..size {
-            for j in 0..i {
-                products[j * size + i] = products[i * size + j];
-            }
-        }
-        Gram { size, products }
+        Gram { size: columns.len(), products: products(columns, columns, range, true) }
     }
 
     /// Product of two columns.
@@ -88,52 +81,25 @@ impl Gram {
             *a += factor * b;
         }
     }
-
-    /// With new columns before the data: `meeting` holds their products, each with those before, the data, and the new
-    /// ones.
-    #[must_use]
-    pub fn with(&self, meeting: &[Vec<f64>]) -> Gram {
-        let old = self.size - 1;
-        let size = self.size + meeting.len();
-        let mut products = vec![0.0; size * size];
-        let mut put = |i: usize, j: usize, value: f64| {
-            products[i * size + j] = value;
-            products[j * size + i] = value;
-        };
-        for i in 0..old {
-            for j in 0..=i {
-                put(i, j, self.at(i, j));
-            }
-            put(i, size - 1, self.at(i, old));
-        }
-        put(size - 1, size - 1, self.at(old, old));
-        for (a, of) in meeting.iter().enumerate() {
-            for (j, product) in of[..old].iter().enumerate() {
-                put(old + a, j, *product);
-            }
-            put(old + a, size - 1, of[old]);
-            for (b, product) in of[self.size..=self.size + a].iter().enumerate() {
-                put(old + a, old + b, *product);
-            }
-        }
-        Gram { size, products }
-    }
 }
 
-/// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; with `lower`, only
-/// as many of `b` as the place of the column of `a` says, for products that are symmetric.
+/// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; `own` where both are
+/// the same columns.
 ///
 /// Rows are taken in blocks that stay in the cache while all pairs meet, with the widest registers that the machine
 /// has.
 #[must_use]
-pub(crate) fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, lower: bool) -> Vec<f64> {
+pub(crate) fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, own: bool) -> Vec<f64> {
     static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
     let mut sums = vec![0.0; a.len() * b.len()];
     let mut from = range.start;
     while from < range.end {
         let rows = from..(from + BLOCK_ROWS).min(range.end);
         from = rows.end;
-        ARCH.dispatch(Block { a, b, rows, lower, sums: &mut sums });
+        ARCH.dispatch(Block { a, b, rows, lower: own, sums: &mut sums });
+    }
+    for (i, j) in (0..a.len()).flat_map(|i| (0..i).map(move |j| (i, j))).filter(|_| own) {
+        sums[j * a.len() + i] = sums[i * a.len() + j];
     }
     sums
 }

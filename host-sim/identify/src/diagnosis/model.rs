@@ -4,7 +4,6 @@
 //! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first.
 //! Nuisance columns get a prior in proportion to what the main columns of their law explain, found by iteration.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -15,7 +14,7 @@ use super::candidate::{Acting, Among, Coefficients, Excitation, Law, Regressor, 
 use super::noise::Whitener;
 use super::products::{Products, Set};
 use super::rows::{combined, rms};
-use crate::linear::{Gram, Prior, Solution, products, solve};
+use crate::linear::{Gram, Prior, Solution, solve};
 
 /// Data and nominal model, averaged and white.
 pub(crate) struct Problem<'a> {
@@ -103,7 +102,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Sets of white columns of a model, the data last.
-    fn sets<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s Set> {
+    fn sets<'s>(&'s self, terms: &[&'s Term<'_>], further: impl IntoIterator<Item = &'s Set>) -> Vec<&'s Set> {
         let terms = terms.iter().map(|term| &term.white.columns);
         [&self.base_white].into_iter().chain(terms).chain(further).chain([&self.data_white]).collect()
     }
@@ -399,11 +398,10 @@ const STEPS: usize = 6;
 /// How far a place may move.
 const MOVE: Prior = Prior { mean: 0.0, std: PLACE_SPREAD };
 
-/// Products of a fixed set of terms, to which others are added for a trial.
+/// A fixed set of terms, to which others are added for a trial.
 pub(crate) struct Scaffold<'p, 'a, 't, 'l> {
     problem: &'p Problem<'a>,
     terms: Vec<&'t Term<'l>>,
-    gram: Gram,
     /// Terms that come before what is tried, where the order matters.
     ahead: usize,
     /// What the terms leave to a law that adds a load, or meets them in the zones of teeth, or is smooth, or not.
@@ -475,13 +473,12 @@ impl Fit {
 }
 
 impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
-    /// Products of the base and some terms.
+    /// Of the base and some terms.
     #[must_use]
     pub fn new(problem: &'p Problem<'a>, terms: impl IntoIterator<Item = &'t Term<'l>>) -> Self {
         let terms: Vec<&Term<'l>> = terms.into_iter().collect();
-        let gram = problem.products.gram(&problem.sets(&terms, None), None);
         let ahead = terms.len();
-        Scaffold { problem, terms, gram, ahead, left: Default::default() }
+        Scaffold { problem, terms, ahead, left: Default::default() }
     }
 
     /// What is tried has this many of the terms before it.
@@ -556,13 +553,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Fits this model with the moves of shape parameters after all other columns.
     fn fit_with(&self, added: Option<&White>, moves: Option<&Set>) -> Option<Fit> {
         let problem = self.problem;
-        let mut sets = problem.sets(&self.terms, None);
-        let mut gram = Cow::Borrowed(&self.gram);
-        for new in added.map(|white| &white.columns).into_iter().chain(moves) {
-            gram = Cow::Owned(gram.with(&problem.products.meeting(new, &sets)));
-            sets.insert(sets.len() - 1, new);
-        }
-        let gram = gram.into_owned();
+        let further = added.map(|white| &white.columns).into_iter().chain(moves);
+        let gram = problem.products.gram(&problem.sets(&self.terms, further), None);
         let mut starts = Vec::new();
         let mut at = problem.base_white.len();
         let all: Vec<&White> = self.terms.iter().map(|t| &t.white).chain(added).collect();
@@ -631,12 +623,14 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .map(|torque| !law.is_load() || torque.abs() > least)
             .collect();
         let some = mask.iter().filter(|m| **m).count() > mask.len() / 10;
-        let masked = |column: &[f64]| -> Vec<f64> {
-            column.iter().zip(&mask).map(|(v, m)| if *m || !some { *v } else { 0.0 }).collect()
+        let masked = |set: &Set| {
+            let of = |column: &Vec<f64>| -> Vec<f64> {
+                column.iter().zip(&mask).map(|(v, m)| if *m || !some { *v } else { 0.0 }).collect()
+            };
+            Set::new(set.iter().map(of).collect())
         };
-        let known: Vec<Vec<f64>> = problem.white_columns(&self.terms, None).into_iter().map(masked).collect();
-        let known: Vec<&[f64]> = known.iter().map(Vec::as_slice).collect();
-        let gram = Gram::of(&known, 0..mask.len());
+        let known: Vec<Set> = problem.sets(&self.terms, None).into_iter().map(masked).collect();
+        let products = Products::over(std::iter::once(0..mask.len()).collect());
         let mut priors = problem.base_priors();
         priors.extend(self.terms.iter().flat_map(|t| t.white.priors(None)));
         tried
@@ -645,12 +639,10 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let lead_columns = self.white(law, Extent::Lead, &places);
                 let mut all = priors.clone();
                 all.extend(lead_columns.priors(None));
-                let new: Vec<Vec<f64>> = lead_columns.columns.iter().map(|c| masked(c)).collect();
-                let new: Vec<&[f64]> = new.iter().map(Vec::as_slice).collect();
-                let with: Vec<&[f64]> = known.iter().chain(&new).copied().collect();
-                let meeting: Vec<Vec<f64>> =
-                    products(&new, &with, 0..mask.len(), false).chunks_exact(with.len()).map(<[f64]>::to_vec).collect();
-                let solution = solve(&gram.with(&meeting), &all, problem.fineness.worth);
+                let new = masked(&lead_columns.columns);
+                let mut sets: Vec<&Set> = known.iter().collect();
+                sets.insert(known.len() - 1, &new);
+                let solution = solve(&products.gram(&sets, None), &all, problem.fineness.worth);
                 let found = solution.map(|s| {
                     law.beginnings(&law.values(&places), lead_columns.by_role(&s.coefficients[priors.len()..]))
                 });

@@ -67,15 +67,8 @@ impl Products {
         }
         let own = older.id == newer.id;
         let [a, b]: [Vec<&[f64]>; 2] = [older, newer].map(|set| set.iter().map(Vec::as_slice).collect());
-        let over = |block: &Range<usize>| {
-            let mut found = products(&a, &b, block.clone(), own);
-            for (i, j) in (0..a.len()).flat_map(|i| (0..i).map(move |j| (i, j))).filter(|_| own) {
-                found[j * a.len() + i] = found[i * a.len() + j];
-            }
-            found
-        };
         let mut met: Met = vec![vec![0.0; a.len() * b.len()]];
-        for block in self.blocks.iter().map(over) {
+        for block in self.blocks.iter().map(|block| products(&a, &b, block.clone(), own)) {
             met[0].iter_mut().zip(&block).for_each(|(sum, product)| *sum += product);
             met.push(block);
         }
@@ -121,18 +114,6 @@ impl Products {
         }
         Gram { size, products }
     }
-
-    /// Products of each column of a new set with those of `sets`, set after set, and the others of its own.
-    pub(crate) fn meeting(&self, new: &Set, sets: &[&Set]) -> Vec<Vec<f64>> {
-        let width: usize = sets.iter().map(|set| set.len()).sum();
-        let mut meeting = vec![vec![0.0; width + new.len()]; new.len()];
-        let mut column = 0;
-        for set in sets.iter().chain([&new]) {
-            self.meet(new, set, None, |i, j, product| meeting[i][column + j] = product);
-            column += set.len();
-        }
-        meeting
-    }
 }
 
 #[cfg(test)]
@@ -153,8 +134,5 @@ mod tests {
         for (part, rows) in [(None, 0..900), (Some(1), 100..640)] {
             assert_eq!(products.gram(&sets, part).products, Gram::of(&columns, rows).products);
         }
-        let alone = products.gram(&[&base, &data], None);
-        let with = alone.with(&products.meeting(&term, &[&base, &data]));
-        assert_eq!(with.products, products.gram(&sets, None).products);
     }
 }

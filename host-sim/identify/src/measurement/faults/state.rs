@@ -108,18 +108,11 @@ impl<'a> StateModel<'a> {
         let (psi, flank) = (s.generator_rad[row], self.flank[session][row]);
         let delta = psi / self.ratio;
         to.extend([1.0, flank, psi / self.motion_scale]);
-        let (s1, c1) = psi.sin_cos();
-        let (s2, c2) = (2.0 * psi).sin_cos();
-        let (s4, c4) = (4.0 * psi).sin_cos();
-        to.extend([s1, c1, s2, c2, s4, c4, flank * s2, flank * c2]);
-        for order in [1.0, 2.0, 4.0] {
-            let (sin, cos) = (order * (psi - delta)).sin_cos();
-            to.extend([sin, cos]);
+        for (angle, orders) in [(psi, &[1.0, 2.0, 4.0][..]), (psi - delta, &[1.0, 2.0, 4.0]), (delta, &[1.0, 2.0])] {
+            to.extend(orders.iter().flat_map(|order| <[f64; 2]>::from((order * angle).sin_cos())));
         }
-        for order in [1.0, 2.0] {
-            let (sin, cos) = (order * delta).sin_cos();
-            to.extend([sin, cos]);
-        }
+        let (sin, cos) = (2.0 * psi).sin_cos();
+        to.extend([flank * sin, flank * cos]);
         let previous = if row == 0 { (row + 1).min(s.len() - 1) } else { row - 1 };
         let moved = (s.generator_rad[row] - s.generator_rad[previous]) * if row == 0 { -1.0 } else { 1.0 };
         let speed = match &s.time_s {
@@ -127,18 +120,12 @@ impl<'a> StateModel<'a> {
             _ => moved,
         };
         to.push(speed);
-        if let Some(torque) = s.torque_n_m.as_ref().filter(|_| self.torque_scale > 0.0) {
-            let t = torque[row] / self.torque_scale;
-            to.extend([t, t * t.abs(), (t / 0.05).tanh(), flank * t.abs()]);
-        } else {
-            to.extend([0.0; 4]);
-        }
-        if let Some(temperature) = &s.temperature_c {
-            let t = (temperature[row] - self.temperature.0) / self.temperature.1;
-            to.extend([t, flank * t]);
-        } else {
-            to.extend([0.0; 2]);
-        }
+        let torque = s.torque_n_m.as_ref().filter(|_| self.torque_scale > 0.0);
+        let t = torque.map_or(0.0, |torque| torque[row] / self.torque_scale);
+        to.extend([t, t * t.abs(), (t / 0.05).tanh(), flank * t.abs()]);
+        let (mean, warmest) = self.temperature;
+        let t = s.temperature_c.as_ref().map_or(0.0, |temperature| (temperature[row] - mean) / warmest);
+        to.extend([t, flank * t]);
     }
 
     /// The error freed of what a fit without its last `extras` columns says, of all rows of a session.
