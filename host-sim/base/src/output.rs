@@ -158,7 +158,7 @@ impl HiddenFile {
         buffer.flush()?;
         drop(buffer);
         file.as_file().sync_all()?;
-        readable_by_all(file.path())?;
+        permit(file.path(), 0o644)?;
         Ok(HiddenFile { target: target.to_owned(), file: Some(file), _hidden: hidden })
     }
 }
@@ -244,13 +244,13 @@ pub fn write_csv<R: Serialize>(path: &Path, records: impl IntoIterator<Item = R>
 
 /// Temporary files are private; outputs are as readable as any other file.
 #[cfg(unix)]
-fn readable_by_all(path: &Path) -> io::Result<()> {
+fn permit(path: &Path, mode: u32) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
-    fs::set_permissions(path, fs::Permissions::from_mode(0o644))
+    fs::set_permissions(path, fs::Permissions::from_mode(mode))
 }
 
 #[cfg(not(unix))]
-fn readable_by_all(_path: &Path) -> io::Result<()> {
+fn permit(_path: &Path, _mode: u32) -> io::Result<()> {
     Ok(())
 }
 
@@ -302,11 +302,7 @@ impl WholeFolder {
                 fs::rename(&*target, &old)?;
                 before = Some(old);
             }
-            #[cfg(unix)]
-            {
-                use std::os::unix::fs::PermissionsExt;
-                fs::set_permissions(parts.path(), fs::Permissions::from_mode(0o755))?;
-            }
+            permit(parts.path(), 0o755)?;
             if let Err(error) = fs::rename(parts.path(), &*target) {
                 // The one before comes back.
                 let _ = before.map(|old| fs::rename(old, &*target));

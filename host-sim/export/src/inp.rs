@@ -202,6 +202,7 @@ impl Deck {
         if backlash_rad <= 0.0 {
             return Err(DeckError::NoClearance(backlash_rad));
         }
+        let way = if settings.torque_n_m < 0.0 { -1.0 } else { 1.0 };
         let width = drive.flexspline.width_mm;
         let (fs, cs) = (&problem.flexspline, &problem.circular_spline);
 
@@ -218,7 +219,7 @@ impl Deck {
             first_generator_node: 0,
             springs: Vec::new(),
             seat_mm: 0.0,
-            bearing_turn_rad: 0.5 * BEARING_TURN * backlash_rad * sign(settings.torque_n_m),
+            bearing_turn_rad: 0.5 * BEARING_TURN * backlash_rad * way,
             load_per_mm: problem.per_width(settings.torque_n_m),
             last_load_per_mm: settings.last_torque_n_m.map(|torque| problem.per_width(torque)),
             settings,
@@ -511,10 +512,6 @@ struct DeckStep {
     output: DeckOutput,
     /// Change of the contact of the flanks: `REMOVE`, `ADD`.
     flanks: Option<&'static str>,
-}
-
-fn sign(x: f64) -> f64 {
-    if x < 0.0 { -1.0 } else { 1.0 }
 }
 
 /// A number in at most 20 characters, which is what CalculiX reads of one.

@@ -14,4 +14,4 @@ pub use inp::{Deck, DeckError, DeckSettings, Equation, EquationTerm, Face, STABI
 pub use outlines::{OutlinePoint, outlines};
 pub use vtu::base64;
 pub use vtu::{VtuFrame, write_pvd, write_vtu};
-pub use vtu_whole::write_whole_flexspline;
+pub use vtu_whole::{station_at, write_whole_flexspline};

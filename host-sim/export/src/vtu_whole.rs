@@ -142,7 +142,7 @@ fn add_tubes(grid: &mut CellGrid, shells: &Flexspline3d, waves: &[RimWave]) {
                 let (sin, cos) = angle.sin_cos();
                 let (mut along, mut around, mut out) = (0.0, 0.0, 0.0);
                 for wave in waves {
-                    let [u, v, w, _] = wave.at(&read(&wave.shape, *z), angle);
+                    let [u, v, w, _] = wave.at(&station_at(&wave.shape, *z), angle);
                     (along, around, out) = (along + u, around + v, out + w);
                 }
                 let at = [shells.rim.radius_mm * cos, shells.rim.radius_mm * sin, *z];
@@ -160,7 +160,7 @@ fn add_tubes(grid: &mut CellGrid, shells: &Flexspline3d, waves: &[RimWave]) {
 }
 
 /// A shape between its stations.
-fn read(shape: &[Station], x_mm: f64) -> Station {
+pub fn station_at(shape: &[Station], x_mm: f64) -> Station {
     let after = shape.partition_point(|station| station.x_mm < x_mm).clamp(1, shape.len() - 1);
     let (a, b) = (shape[after - 1], shape[after]);
     let part = ((x_mm - a.x_mm) / (b.x_mm - a.x_mm)).clamp(0.0, 1.0);

@@ -6,7 +6,7 @@ use flexspline::Drive;
 
 use super::flight::{ARCSEC_PER_RAD, JointUnit};
 use super::gear::SampledSpring;
-use super::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
+use super::scenario::{Leg, Load, Scenario};
 use super::servo::ServoSettings;
 
 /// A unit like HHD-95 with a double disc, with these tooth counts: 31″ of clearance to each side, wind-up that hardens,
@@ -22,24 +22,12 @@ pub fn unit(drive: Drive) -> JointUnit {
 /// the load, the table calibrated.
 pub fn scenario() -> Scenario {
     Scenario {
-        name: "dish".to_owned(),
         legs: [(2.0, 0.0), (3.0, 2e-3), (3.0, -2e-3), (3.0, 1e-4), (3.0, -1e-4)]
             .map(|(seconds, rate_rad_s)| Leg { seconds, rate_rad_s })
             .to_vec(),
-        acceleration_rad_s2: 0.05,
         load: Load { bias_n_m: 8.0, swing: [6.0, 0.05], gust: [1.5, 0.3], ..Load::default() },
-        load_kg_m2: 3.0,
-        drag_n_m: 0.5,
-        damping: 0.02,
-        temperature_c: 20.0,
         servo: ServoSettings { position_hz: 12.0, integral_hz: 5.0, ..ServoSettings::HHD_95 },
-        friction: 1.0,
-        friction_known: 0.8,
-        load_fed_forward: 1.0,
-        torque: TorqueKnown::OnLoad,
-        torque_noise_n_m: 0.05,
-        table: TableKnown::Calibrated,
         seed: 3,
-        ..Scenario::default()
+        ..Scenario::usual("dish")
     }
 }

@@ -110,20 +110,17 @@ impl JointUnit {
 
     /// A unit of a drive as designed, with the same beside it: lines, stiffness and clearance.
     pub fn of_gear(drive: Drive, nominal: Gear) -> Self {
-        let line = |generator: f64, output: f64, arcsec: f64, phase_rad: f64| GearLine {
-            generator,
-            output,
-            amplitude_rad: arcsec / ARCSEC_PER_RAD,
-            phase_rad,
+        let line = |[generator, output, arcsec, phase_rad]: [f64; 4]| {
+            GearLine::of(&[generator, output, arcsec / ARCSEC_PER_RAD, phase_rad])
         };
-        let mut lines = nominal.lines.clone();
-        lines.extend([
-            line(2.0, -2.0, 19.5, 0.9),
-            line(4.0, -4.0, 3.9, 2.0),
-            line(2.0, 0.0, 8.5, 0.3),
-            line(1.0, 0.0, 3.0, 1.7),
-            line(0.0, 1.0, 10.0, 0.5),
-        ]);
+        let beside = [
+            [2.0, -2.0, 19.5, 0.9],
+            [4.0, -4.0, 3.9, 2.0],
+            [2.0, 0.0, 8.5, 0.3],
+            [1.0, 0.0, 3.0, 1.7],
+            [0.0, 1.0, 10.0, 0.5],
+        ];
+        let lines = nominal.lines.iter().copied().chain(beside.map(line)).collect();
         let spring = match &nominal.spring {
             Spring::Sampled(sampled) => Spring::Sampled(Box::new(sampled.as_built(1.06, 2.0 / ARCSEC_PER_RAD))),
             cubic @ Spring::Cubic { .. } => cubic.clone(),

@@ -29,6 +29,11 @@ pub struct GearLine {
 }
 
 impl GearLine {
+    /// Of its periods, amplitude and phase, in the order of its fields.
+    pub(crate) fn of(&[generator, output, amplitude_rad, phase_rad]: &[f64; 4]) -> Self {
+        GearLine { generator, output, amplitude_rad, phase_rad }
+    }
+
     /// Sine and cosine at two angles.
     fn turned(&self, generator_rad: f64, output_rad: f64) -> (f64, f64) {
         libm::sincos(self.generator * generator_rad + self.output * output_rad + self.phase_rad)
@@ -352,13 +357,7 @@ impl Gear {
         let ([ratio, count], rest) = numbers.split_first_chunk::<2>()?;
         // More than there are numbers is refused by the split.
         let (lines, rest) = rest.split_at_checked((*count as usize).checked_mul(4)?)?;
-        let line = |&[generator, output, amplitude_rad, phase_rad]: &[f64; 4]| GearLine {
-            generator,
-            output,
-            amplitude_rad,
-            phase_rad,
-        };
-        let lines = lines.as_chunks::<4>().0.iter().map(line).collect();
+        let lines = lines.as_chunks::<4>().0.iter().map(GearLine::of).collect();
         let (kind, rest) = rest.split_first()?;
         let spring = if *kind == 0.0 {
             let &[half_clearance_rad, stiffness, hardening] = rest else { return None };

@@ -108,6 +108,27 @@ pub struct Scenario {
 const LEAST_HZ: f64 = 1.0;
 
 impl Scenario {
+    /// A joint of the size of HHD-95 at room temperature whose load and unit are known, without legs and load.
+    pub fn usual(name: &str) -> Scenario {
+        Scenario {
+            name: name.to_owned(),
+            acceleration_rad_s2: 0.05,
+            load_kg_m2: 3.0,
+            drag_n_m: 0.5,
+            damping: 0.02,
+            temperature_c: 20.0,
+            servo: ServoSettings::HHD_95,
+            friction: 1.0,
+            friction_known: 0.8,
+            load_fed_forward: 1.0,
+            torque: TorqueKnown::OnLoad,
+            torque_noise_n_m: 0.05,
+            table: TableKnown::Calibrated,
+            seed: 1,
+            ..Scenario::default()
+        }
+    }
+
     /// Time of the whole flight, s.
     pub fn seconds(&self) -> f64 {
         self.legs.iter().map(|leg| leg.seconds).sum()

@@ -6,6 +6,7 @@
 
 use serde::Serialize;
 
+use flexspline_export::station_at;
 use flexspline_mechanics::contact::{Configuration, FlankLaw};
 use flexspline_mechanics::mesh::MeshError;
 use flexspline_mechanics::sleeve::{Flexspline3d, Station};
@@ -74,8 +75,9 @@ impl SleeveView {
             .filter(|(_, [a, b])| a.hypot(*b) > LEAST_SHARE * largest)
             .map(|(n, [a, b])| {
                 let shape = shells.shape(n);
-                let read =
-                    |of: fn(&Station) -> f64| stations_mm.iter().map(|x| rounded(between(&shape, *x, of))).collect();
+                let read = |of: fn(&Station) -> f64| {
+                    stations_mm.iter().map(|x| rounded(of(&station_at(&shape, *x)))).collect()
+                };
                 let (sin, cos) = (f64::from(n) * state.generator_rad).sin_cos();
                 DrawnWave {
                     n,
@@ -123,15 +125,6 @@ fn stations(shape: &[Station], half_face: f64) -> Vec<f64> {
     places
 }
 
-/// A value of a shape between its stations.
-fn between(shape: &[Station], x_mm: f64, of: fn(&Station) -> f64) -> f64 {
-    let after = shape.partition_point(|at| at.x_mm < x_mm).clamp(1, shape.len() - 1);
-    let (a, b) = (&shape[after - 1], &shape[after]);
-    let part = ((x_mm - a.x_mm) / (b.x_mm - a.x_mm)).clamp(0.0, 1.0);
-    of(a) + part * (of(b) - of(a))
-}
-
-/// How the load lies along the face of the flank that bears most.
 fn load_across_face(problem: &Problem, state: &State) -> Vec<f64> {
     let flanks = problem.flanks();
     let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };

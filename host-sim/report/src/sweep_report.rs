@@ -57,19 +57,18 @@ pub fn page(of: &SweepSources<'_>) -> Page {
         title: format!("Sweep of {}", sweep.drive),
         command_name: "sweep",
         status: if of.remarks.is_empty() { Status::Good } else { Status::Remark },
-        also: Vec::new(),
         remarks: of.remarks.iter().map(|remark| format!("{remark}.")).collect(),
         choices: sweep.generators.iter().map(choice).collect(),
         choice_is: "Generator",
         headlines: sweep.generators.iter().map(|one| headline(of, one)).collect(),
         sections,
-        animations: Vec::new(),
         provenance: vec![
             ("command".to_owned(), of.command.to_owned()),
             ("plan".to_owned(), plan.hash.clone()),
             ("drive_hash".to_owned(), blake3::Hash::from_bytes(plan.drive.hash()).to_hex().to_string()),
         ],
         results: Map::from_iter([("sweep".to_owned(), json!(sweep))]),
+        ..Page::default()
     }
 }
 

@@ -112,28 +112,12 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
             Err(what) => problems.push(Problem::of(path, what)),
         }
     }
-    let drive = match from.with_sets(good.iter().copied()) {
-        Ok(drive) => Some(drive),
-        Err(error) => {
-            problems.extend(error.problems);
-            None
-        }
-    };
+    let drive = from.with_sets(good.iter().copied()).map_err(|error| problems.extend(error.problems)).ok();
     let whole = drive.as_ref().filter(|_| problems.is_empty());
     // Geometry at the edge of what is allowed is the one thing here that could go wrong unforeseen.
-    let drawn = whole.map(|drive| catch_unwind(|| draw(drive, kind, gaps)));
-    let drawing = match drawn {
-        Some(Ok(Ok(drawing))) => Some(drawing),
-        Some(Ok(Err(error))) => {
-            problems.extend(error.problems);
-            None
-        }
-        Some(Err(_)) => {
-            problems.push(Problem::of("", "these sizes make no drawing"));
-            None
-        }
-        None => None,
-    };
+    let unforeseen = || DriveError { problems: vec![Problem::of("", "these sizes make no drawing")] };
+    let drawn = |drive| catch_unwind(|| draw(drive, kind, gaps)).unwrap_or_else(|_| Err(unforeseen()));
+    let drawing = whole.and_then(|drive| drawn(drive).map_err(|error| problems.extend(error.problems)).ok());
     let mut cautions = Vec::new();
     if let Some(gap) = drawing.as_ref().and_then(|drawing| drawing.least_gap_um).filter(|gap| *gap < 0.0)
         && drive.as_ref().is_some_and(|drive| drive.flanks.preload_um == 0.0)

@@ -1,6 +1,6 @@
 //! The scenarios that have a name.
 
-use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
+use flexspline_motion::scenario::{Leg, Load, Scenario};
 use flexspline_motion::servo::ServoSettings;
 
 use super::Flown;
@@ -16,26 +16,8 @@ fn legs(legs: &[(f64, f64)]) -> Vec<Leg> {
 /// The scenario of a name.
 #[must_use]
 pub fn built_in(name: &str) -> Option<Flown> {
-    let none = Load { bias_n_m: 0.0, swing: [0.0, 0.0], gust: [0.0, 0.0], step: [0.0, 0.0], gravity: [0.0, 0.0] };
-    let base = |legs: Vec<Leg>, load: Load| Scenario {
-        name: name.to_owned(),
-        legs,
-        acceleration_rad_s2: 0.05,
-        load,
-        load_kg_m2: 3.0,
-        drag_n_m: 0.5,
-        damping: 0.02,
-        temperature_c: 20.0,
-        warming_k_s: 0.0,
-        servo: ServoSettings::HHD_95,
-        friction: 1.0,
-        friction_known: 0.8,
-        load_fed_forward: 1.0,
-        torque: TorqueKnown::OnLoad,
-        torque_noise_n_m: 0.05,
-        table: TableKnown::Calibrated,
-        seed: 1,
-    };
+    let base = |legs: Vec<Leg>, load: Load| Scenario { legs, load, ..Scenario::usual(name) };
+    let none = Load::default();
     let flown = |kind, scenario| Some(Flown { kind, scenario, own: None });
     match name {
         // 0.001 to 1 °/s with reversals, a slow swing of the wind that crosses zero, gusts.
