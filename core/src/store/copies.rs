@@ -11,11 +11,11 @@ pub const STORE_ROOM: usize = match option_env!("FLEXSPLINE_STORE_WORDS") {
     },
     None => 1072,
 };
-/// Those that hold no word of a table: 40 for what is known of it and the mark of C, and [`SLACK`].
+/// Those that hold no word of a table: 40 for what is known of it and the mark of C, and [`SLACK`], by definition.
 pub const BESIDE: usize = 40 + SLACK;
 /// Largest copy that fits into a store, words: 72 for the axes, curves, and for each torque node 3 and its ripple.
 pub const STORE_WORDS: usize = STORE_ROOM - BESIDE;
-/// Places of an accepted table are below; in a store for any table this shows it to the compiler.
+/// Places of an accepted table are below; in a store for any table this shows that bound to the compiler.
 const MASK: usize = STORE_WORDS.next_power_of_two() - 1;
 /// Words that a read may take from the last place on.
 pub(super) const SLACK: usize = 8;

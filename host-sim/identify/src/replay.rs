@@ -17,7 +17,7 @@ use crate::measurement::{
 };
 use crate::misfit::{Misfit, TurnsOff, about_mean};
 use crate::nominal::Nominal;
-use crate::wind_up::WindUp;
+use crate::wind_up::WindUpCurve;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::generator_of;
 
@@ -348,7 +348,7 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
 }
 
 /// Share of the rows whose error lies inside the half width that an interval of their torque is of, and that in
-/// standard deviations of noise.
+/// standard deviations of noise, by definition.
 const INSIDE: f64 = 0.95;
 const OF_95: f64 = 1.96;
 
@@ -363,7 +363,7 @@ fn read_torques(table: &Table<'_>, rows: &mut [ReplayedRow]) {
         let errors: Vec<f64> = rows.iter().map(|row| row.measured_arcsec).collect();
         OF_95 * white_noise([&errors[..]]).hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)
     };
-    let mut wind_up = WindUp::new(table, PlayState::unknown());
+    let mut wind_up = WindUpCurve::new(table, PlayState::unknown());
     for row in rows {
         let [error, half_width] = [row.measured_arcsec - zero, half_width_arcsec].map(|arcsec| arcsec / ARCSEC_PER_RAD);
         let torque = wind_up.read(row.generator_rad, error, row.temperature_c, half_width);

@@ -9,7 +9,7 @@
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Table};
 
-/// Halvings of the range of a table: to a millionth of it.
+/// Halvings of the range of a table: to a millionth of it. *Guess*.
 const HALVINGS: u32 = 20;
 /// Share of the newest torque in that by which the play is moved: the noise of one row would move the output from flank
 /// to flank. *Guess*.
@@ -26,13 +26,13 @@ pub(crate) fn load_of(error: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2],
 
 /// Readings of two encoders as torques.
 #[derive(Debug, Clone)]
-pub struct WindUp<'t> {
+pub struct WindUpCurve<'t> {
     table: &'t Table<'t>,
     play: PlayState,
     torque_n_m: f64,
 }
 
-impl<'t> WindUp<'t> {
+impl<'t> WindUpCurve<'t> {
     /// By a table, from where a drive rests in its play.
     #[must_use]
     pub fn new(table: &'t Table<'t>, play: PlayState) -> Self {

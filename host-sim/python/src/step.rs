@@ -7,7 +7,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{dead_zone_n_m, generator_of};
 use flexspline_identify::measurement::ColumnMap;
 use flexspline_identify::replay::{MeasuredRow, RowsOf, RowsRead, read, replay};
-use flexspline_identify::wind_up::WindUp;
+use flexspline_identify::wind_up::WindUpCurve;
 use flexspline_mechanics::drive::GeneratorKind;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
@@ -308,8 +308,8 @@ impl Table {
         for_rows(py, rows, |row| put(row, Approach::From(&play)))
     }
 
-    /// Torques by wind-up. With `direction` each row for itself, in steady motion; else in row order from `state`, which
-    /// stays.
+    /// Torques by wind-up. With `direction` each row for itself, in steady motion; else in row order from `state`,
+    /// which stays.
     #[expect(clippy::too_many_arguments, reason = "each is a column")]
     fn torque(
         &self,
@@ -337,10 +337,10 @@ impl Table {
         let ratio = table.drive().exact_ratio();
         let sides = direction.as_ref().map(|direction| directions(input("direction", direction)?)).transpose()?;
         let sides = sides.as_ref().map(|sides| Column::new("direction", sides, rows)).transpose()?;
-        let mut wind_up = WindUp::new(table, state.map_or(CoreState::unknown(), PlayState::get));
+        let mut wind_up = WindUpCurve::new(table, state.map_or(CoreState::unknown(), PlayState::get));
         for_rows(py, rows, |row| {
             if let Some(sides) = sides {
-                wind_up = WindUp::new(table, CoreState::after_motion(sides.at(row)));
+                wind_up = WindUpCurve::new(table, CoreState::after_motion(sides.at(row)));
             }
             let error = reading.at(row) - generator[row] / ratio;
             [torque[row], low[row], high[row]] =

@@ -67,7 +67,8 @@ pub(super) struct Calibrate {
     split: bool,
     /// Entries in the tables of the encoders, and counts in a turn of the output's, negative if they fall as its angle
     /// rises: 32:4096 [default: 256, counts of the output column]
-    #[arg(long, value_name = "N[:COUNTS]", allow_hyphen_values = true, requires = "split", value_parser = encoder_table)]
+    #[arg(long, value_name = "N[:COUNTS]", allow_hyphen_values = true, requires = "split")]
+    #[arg(value_parser = encoder_table)]
     encoder_table: Option<(usize, Option<f64>)>,
     /// Do not write report.html
     #[arg(long)]
@@ -124,18 +125,30 @@ impl BenchOptions {
     }
 }
 
-/// Entries of an encoder's table, unless they are said: what controllers hold that have a table of their own.
+/// Entries of an encoder's table, unless they are said. *Guess*.
 const USUAL_ENTRIES: usize = 256;
 
+/// What is no `N` or `N:COUNTS`.
+#[derive(Debug)]
+struct NoEncoderTable;
+
+impl std::fmt::Display for NoEncoderTable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("allowed: 2 to 65536 entries, as in 32, or with the counts in a turn, as in 32:4096")
+    }
+}
+
+impl std::error::Error for NoEncoderTable {}
+
 /// Reads `N` or `N:COUNTS`.
-fn encoder_table(text: &str) -> Result<(usize, Option<f64>), String> {
+fn encoder_table(text: &str) -> Result<(usize, Option<f64>), NoEncoderTable> {
     let (entries, counts) = text.split_once(':').map_or((text, None), |(entries, counts)| (entries, Some(counts)));
     let entries = entries.parse().ok().filter(|entries| (2..=65_536).contains(entries));
     let counts = counts.map(|counts| counts.parse().ok().filter(|counts: &i64| (2..=1 << 40).contains(&counts.abs())));
     match (entries, counts) {
         (Some(entries), None) => Ok((entries, None)),
         (Some(entries), Some(Some(counts))) => Ok((entries, Some(counts as f64))),
-        _ => Err("allowed: 2 to 65536 entries, as in 32, or with the counts in a turn, as in 32:4096".to_owned()),
+        _ => Err(NoEncoderTable),
     }
 }
 
@@ -171,8 +184,8 @@ impl Calibrate {
         let counts = counts.or_else(|| map.counts_of_output());
         if self.encoder_table.is_some() && counts.is_none() {
             return Err(Failure::BadInput(format!(
-                "--encoder-table: found {entries} without counts in a turn, which --columns does not say of the output; \
-                 allowed: {entries}:COUNTS"
+                "--encoder-table: found {entries} without counts in a turn, which --columns does not say of the \
+                 output; allowed: {entries}:COUNTS"
             )));
         }
         let calibrate = if self.split { calibrate_and_split } else { calibrate };

@@ -45,11 +45,11 @@ pub use reading::{ByCore, Reading};
 use reading::{DELAY, Delays, OFFSET, delay_note, play_of_a_millisecond};
 pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
-use split::Waves;
+use split::SplitWaves;
 pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
 
 use together::{Agreement, Starts};
-pub use torque::TorqueFromWindUp;
+pub use torque::WindUpTorque;
 pub(crate) use zero::Alignment;
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
@@ -317,7 +317,7 @@ pub struct Calibration {
     pub play_of_a_millisecond_arcsec: Option<f64>,
     /// How good a torque from the wind-up would be, where one was recorded and the table gives way to it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_from_wind_up: Option<TorqueFromWindUp>,
+    pub torque_from_wind_up: Option<WindUpTorque>,
     /// All that belongs to the reading. Generator angle zero of the table is where the first log reads zero.
     pub readings: Vec<Reading>,
     /// The parts.
@@ -552,8 +552,8 @@ const OTHER_START: f64 = 0.7;
 /// … and the generator is off by more than this beyond the interval, deg. *Guess*: a degree moves a table by little.
 const LEAST_START_DEG: f64 = 1.0;
 
-/// A log with each piece that has a zero of its own on the zero of a table, where its waves tell that. Whole turns stay:
-/// a motor that was homed in another turn did not start anew.
+/// A log with each piece that has a zero of its own on the zero of a table, where its waves tell that. Whole turns
+/// stay: a motor that was homed in another turn did not start anew.
 pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     let prior = Prior::of_table(table, GeneratorKind::Cam);
     let mut sessions = Vec::new();
@@ -570,8 +570,8 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
             let zero_rad = found.generator_zero_deg.to_radians();
             piece.sessions.iter_mut().for_each(|session| session.turn_generator(zero_rad, prior.nominal.ratio));
             log.notes.push(format!(
-                "line {}: from here the generator reads {:+.2} ± {:.2} deg where that of the table is zero: the rows are \
-                 put on the zero of the table",
+                "line {}: from here the generator reads {:+.2} ± {:.2} deg where that of the table is zero: the rows \
+                 are put on the zero of the table",
                 piece.sessions[0].line[0], found.generator_zero_deg, found.generator_half_width_deg
             ));
         }
@@ -610,8 +610,8 @@ fn fit_with_table(
     })
 }
 
-/// Report on a table and the fit that it is of, to logs whose `zeros` and delays were taken out; `said` is noted of these
-/// and of the ratio, and the error is split if that was asked.
+/// Report on a table and the fit that it is of, to logs whose `zeros` and delays were taken out; `said` is noted of
+/// these and of the ratio, and the error is split if that was asked.
 fn report(
     (files, delays, zeros): (&[Recording], Option<Delays>, Vec<Reading>),
     (prior, alignment): (&Prior<'_>, Option<Alignment>),
@@ -623,7 +623,7 @@ fn report(
     let agreement = fitted.agreement();
     let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
     let Fitted { rows, folds, model, held_out, .. } = fitted;
-    let torque_from_wind_up = TorqueFromWindUp::of(&rows, &folds, &model, prior).filter(|_| recorded.has_torque);
+    let torque_from_wind_up = WindUpTorque::of(&rows, &folds, &model, prior).filter(|_| recorded.has_torque);
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = ByCore::of(files, &image, recorded);
     let mut readings = delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
@@ -664,7 +664,7 @@ fn report(
         let changing = &known_with(&[&beside[..], &changes].concat())?;
         let (model, known, changes, has_torque) = (&model, &known, &changes, recorded.has_torque);
         let states: Vec<State> = some_rows().map(as_fitted).collect();
-        let (split, gear) = Waves { model, known, changing, changes, has_torque }.split(&states, prior);
+        let (split, gear) = SplitWaves { model, known, changing, changes, has_torque }.split(&states, prior);
         Ok::<_, CalibrationError>((split, table::make(prior, &gear, recorded)?))
     };
     let changes = split.then(|| split::recorded_changes(&rows, &model, prior, known.noise.rms_arcsec));

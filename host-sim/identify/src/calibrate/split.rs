@@ -32,11 +32,11 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 const LEAST_CHANGE: f64 = 0.5;
 /// A wave is an encoder's if no more than this share of it may be another's. *Guess*.
 const MOST_OF_ANOTHER: f64 = 0.5;
-/// Orders of the output that the weight of an arm makes by a wind-up that hardens: see the curve over the output.
+/// Orders of the output that the weight of an arm makes by a wind-up that hardens. *Guess*.
 const ORDERS_OF_A_WEIGHT: u32 = 3;
 
 /// An encoder and the curve over its turn.
-struct Encoder {
+struct EncoderTurn {
     of: &'static str,
     turn: &'static str,
     part: PartName,
@@ -44,9 +44,14 @@ struct Encoder {
     first: usize,
 }
 
-const ENCODERS: [Encoder; 2] = [
-    Encoder { of: "encoder_output", turn: "output", part: PartName::OutputAngle, first: 2 * GENERATOR_ORDERS as usize },
-    Encoder { of: "encoder_generator", turn: "generator", part: PartName::GeneratorAngle, first: 0 },
+const ENCODERS: [EncoderTurn; 2] = [
+    EncoderTurn {
+        of: "encoder_output",
+        turn: "output",
+        part: PartName::OutputAngle,
+        first: 2 * GENERATOR_ORDERS as usize,
+    },
+    EncoderTurn { of: "encoder_generator", turn: "generator", part: PartName::GeneratorAngle, first: 0 },
 ];
 const GEAR: &str = "gear";
 
@@ -75,7 +80,7 @@ pub struct SplitPart {
 pub struct WaveShare {
     /// Whose turn: `output` or `generator`.
     pub turn: &'static str,
-    /// Waves in a turn.
+    /// SplitWaves in a turn.
     pub order: u32,
     /// Amplitude, arcsec.
     pub amplitude_arcsec: f64,
@@ -121,8 +126,8 @@ pub(super) fn recorded_changes(
     all.into_iter().filter(|(_, recorded)| *recorded).map(|(part, _)| sized(part)).collect()
 }
 
-/// Waves that are handed out.
-pub(super) struct Waves<'a> {
+/// SplitWaves that are handed out.
+pub(super) struct SplitWaves<'a> {
     pub model: &'a Model,
     pub known: &'a ModelUncertainty,
     /// The same with the changes that were recorded.
@@ -131,9 +136,9 @@ pub(super) struct Waves<'a> {
     pub has_torque: bool,
 }
 
-impl Waves<'_> {
-    /// Amplitude that the gear may have of a wave at the encoder of whose turn it is, arcsec, or why all of it.
-    fn of_gear(&self, encoder: &Encoder, order: u32) -> Result<f64, String> {
+impl SplitWaves<'_> {
+    /// Amplitude that the gear may have of a wave at the encoder of whose turn it is, arcsec; infinite if all, and why.
+    fn of_gear(&self, encoder: &EncoderTurn, order: u32) -> (f64, Option<String>) {
         let of_output = encoder.part == PartName::OutputAngle;
         let turned = format!(
             "; turn the body of the {} encoder by {:.0} deg and calibrate again: what turns with it is the encoder's",
@@ -141,19 +146,25 @@ impl Waves<'_> {
             180.0 / f64::from(order)
         );
         if !of_output && order.is_multiple_of(2) {
-            return Err(format!("a pitch error of the fixed wheel does the same at any load and both ways{turned}"));
+            let why = format!("a pitch error of the fixed wheel does the same at any load and both ways{turned}");
+            return (f64::INFINITY, Some(why));
         }
         if of_output && order <= ORDERS_OF_A_WEIGHT && !self.has_torque {
-            return Err(format!("the weight of an arm does the same by the wind-up: record the torque{turned}"));
+            let why = format!("the weight of an arm does the same by the wind-up: record the torque{turned}");
+            return (f64::INFINITY, Some(why));
         }
         let first = encoder.first + 2 * (order as usize - 1);
         let change = |(part, _): &(PartName, f64)| {
             let [sine, cosine] = [0, 1].map(|k| self.changing.std_of(*part, first + k).unwrap_or(f64::INFINITY));
             OF_95 * sine.hypot(cosine)
         };
-        let most = self.changes.iter().map(change).reduce(f64::max);
-        let most = most.ok_or("one load on one flank was recorded: record both directions, and several loads");
-        Ok(most? / LEAST_CHANGE)
+        match self.changes.iter().map(change).reduce(f64::max) {
+            Some(most) => (most / LEAST_CHANGE, None),
+            None => {
+                let why = "one load on one flank was recorded: record both directions, and several loads";
+                (f64::INFINITY, Some(why.to_owned()))
+            }
+        }
     }
 
     /// Hands the waves out; also the model of the gear. `prior` is the gear's.
@@ -178,20 +189,20 @@ impl Waves<'_> {
                 if amplitude < own.min(self.known.noise.rms_arcsec) {
                     continue;
                 }
-                let of_gear = self.of_gear(encoder, order).map(|most| most.min(amplitude));
-                let half_width = own.hypot(of_gear.as_ref().copied().unwrap_or(amplitude));
-                let is_encoders = of_gear.is_ok() && half_width <= MOST_OF_ANOTHER * amplitude;
-                let why = match &of_gear {
-                    Err(why) => why.clone(),
-                    Ok(most) => format!(
-                        "known to ±{own:.2} arcsec; as far as it may change with load and flank, ±{most:.2} of it may \
-                         be the gear's{}",
+                let (of_gear, why_all) = self.of_gear(encoder, order);
+                let of_gear = of_gear.min(amplitude);
+                let half_width = own.hypot(of_gear);
+                let is_encoders = why_all.is_none() && half_width <= MOST_OF_ANOTHER * amplitude;
+                let why = why_all.unwrap_or_else(|| {
+                    format!(
+                        "known to ±{own:.2} arcsec; as far as it may change with load and flank, ±{of_gear:.2} of it \
+                         may be the gear's{}",
                         if is_encoders { "" } else { ": record several loads at the same angles, both ways" }
-                    ),
-                };
+                    )
+                });
                 if is_encoders {
                     owner[begin..begin + 2].fill(which);
-                    open[which] += 0.5 * of_gear.unwrap_or_default().powi(2);
+                    open[which] += 0.5 * of_gear.powi(2);
                     gear.coefficients[begin..begin + 2].fill(0.0);
                 }
                 parts[if is_encoders { which } else { 2 }].shares.push(WaveShare {

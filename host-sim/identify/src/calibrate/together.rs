@@ -116,15 +116,15 @@ const OTHER_TURN: f64 = 1.2;
 /// Logs that are turned, at most: pieces of one log with zeros of their own are many, and their generator is one.
 /// *Guess*.
 const MOST_LOGS: usize = 8;
-/// Rows that an angle is looked for with, and found with, and steps over a generator turn, coarse ones and the fine ones
-/// in each: an eighth of the wave of the highest order, and less.
+/// Rows that an angle is looked for with, and found with, and steps over a generator turn, coarse ones and the fine
+/// ones in each: an eighth of the wave of the highest order, and less. *Guesses*.
 const ROWS_OF_A_SEARCH: usize = 300;
 const FOUND_WITH: usize = 3000;
 const STEPS_OF_A_TURN: f64 = 48.0;
 const FINE_STEPS: f64 = 8.0;
-/// An output that is off by this, rad, has another zero, or its generator has: beyond any clearance and wind-up. *Guess*.
+/// An output that is off by this, rad, has another zero, or its generator has: beyond clearance and wind-up. *Guess*.
 const OTHER_ZERO_RAD: f64 = 1500.0 / ARCSEC_PER_RAD;
-/// Fits to the output's angles that find a zero: the first with the waves where they are not.
+/// Fits to the output's angles that find a zero: the first with the waves where they are not. *Guess*.
 const FITS_TO_THE_OUTPUT: usize = 2;
 
 /// Name of the reading of a zero.
@@ -145,12 +145,12 @@ pub(super) struct Starts(Vec<Start>);
 impl Starts {
     /// Of two logs and more, if one starts elsewhere than the first.
     ///
-    /// An output that reads absolutely says where the generator was: the ratio times what it is off. Whether it reads so
-    /// is seen by what a fit to both logs leaves; else the waves say what they can.
+    /// An output that reads absolutely says where the generator was: the ratio times what it is off. Whether it reads
+    /// so is seen by what a fit to both logs leaves; else the waves say what they can.
     pub(super) fn of(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>, files: &[Recording]) -> Option<Starts> {
         let parts = recorded.shown(PartName::ALL, prior);
         let pair =
-            |log: usize| Pair { rows: rows.of_logs([0, log]), log, parts: &parts, scales: &recorded.scales, prior };
+            |log: usize| LogPair { rows: rows.of_logs([0, log]), log, parts: &parts, scales: &recorded.scales, prior };
         let begins = |log: usize| files[log].sessions.first().map_or(0.0, |session| session.zero_off_rad);
         let first = Start { zero_rad: Some([0.0; 2]), output_turns: 0.0 };
         let logs = if files.len() > MOST_LOGS { 1 } else { files.len() };
@@ -191,8 +191,8 @@ impl Starts {
         });
         let zeros: Vec<String> = zeros.collect();
         let put = format!(
-            "the zero of the generator is not the same in all logs: against {} it reads {}; they are put on that of the \
-             first",
+            "the zero of the generator is not the same in all logs: against {} it reads {}; they are put on that of \
+             the first",
             name(0),
             zeros.join(", ")
         );
@@ -212,7 +212,7 @@ impl Starts {
 }
 
 /// The rows of the first log and of another.
-struct Pair<'a> {
+struct LogPair<'a> {
     rows: Rows,
     log: usize,
     parts: &'a [PartName],
@@ -220,7 +220,7 @@ struct Pair<'a> {
     prior: &'a Prior<'a>,
 }
 
-impl Pair<'_> {
+impl LogPair<'_> {
     /// With the generator of the other turned back, and the angle of the output, which is the generator's over the
     /// ratio.
     fn turned(&self, zero_rad: f64) -> Rows {

@@ -12,12 +12,12 @@ use crate::wind_up::load_of;
 use flexspline_base::robust::rms;
 use flexspline_base::statistics::mean;
 
-/// Share of the rows whose interval is to hold their torque.
+/// Share of the rows whose interval is to hold their torque, by definition.
 const INSIDE: f64 = 0.95;
 
 /// Torque from the wind-up against that recorded, rows in steady motion, each by a fit without its fold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TorqueFromWindUp {
+pub struct WindUpTorque {
     /// Difference, N·m rms.
     pub rms_n_m: f64,
     /// Its mean, N·m.
@@ -38,7 +38,7 @@ struct LeftOut<'a> {
     left_arcsec: f64,
 }
 
-impl TorqueFromWindUp {
+impl WindUpTorque {
     /// None where the output does not give way to the load.
     pub(super) fn of(rows: &Rows, folds: &Folds, model: &Model, prior: &Prior<'_>) -> Option<Self> {
         let range @ [low, high] = model.scales.torque_n_m;
@@ -83,7 +83,7 @@ impl TorqueFromWindUp {
                 inside += f64::from((least..=most).contains(&recorded));
             }
         }
-        Some(TorqueFromWindUp {
+        Some(WindUpTorque {
             rms_n_m: rms(&off),
             bias_n_m: mean(&off),
             inside: inside / off.len().max(1) as f64,

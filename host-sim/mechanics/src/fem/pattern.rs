@@ -1,6 +1,6 @@
 //! Sparsity pattern of a symmetric matrix whose unknowns come in pairs (x and y of a node), lower triangle by columns.
 
-/// Position of an entry that the matrix does not store.
+/// Position of an entry that the matrix does not store, by definition.
 const ABSENT: u32 = u32::MAX;
 
 /// Positions of the lower triangle over some nodes, packed by rows (see [`crate::fem::element`]). Entries of fixed
