@@ -24,9 +24,7 @@ fn main() -> ! {
     let states = cortex_m::singleton!(: [JointState; JOINTS] = [const { JointState::new() }; JOINTS]);
     let (Some(store), Some(states)) = (store, states) else { finish(false) };
     let mut images = TABLES.map(|(_, [first, second])| Images::new(first, second)).into_iter().rev();
-    let Some(images) = images.find(|images| store.activate(images, JOINT.drive(), 21.0).is_ok()) else {
-        finish(false)
-    };
+    let Some(images) = images.find(|images| store.activate(images, JOINT.drive(), 21.0).is_ok()) else { finish(false) };
     let mut trajectories: [_; JOINTS] = core::array::from_fn(|number| Trajectory::new(number as u32 + 1));
     states.iter_mut().for_each(|state| _ = state.request(Mode::Tracking));
     let mut corrected = 0;
