@@ -253,7 +253,8 @@ mod tests {
     /// A joint and a store with this table, at 20 °C.
     fn joint(drive: Drive, image: &[u8]) -> (Joint, Store) {
         let mut store = Store::new();
-        store.activate(&Images::new(image, &image.to_vec()), &drive, 20.0).unwrap();
+        let second = image.to_vec();
+        store.activate(&Images::new(image, &second), &drive, 20.0).unwrap();
         (Joint::new(drive, LIMITS, Overrun::HoldLast).unwrap(), store)
     }
 

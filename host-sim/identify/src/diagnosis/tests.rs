@@ -519,7 +519,8 @@ fn rows_without_a_change_of_flank_are_predicted_as_they_are_among_others() {
     let rows = |of: fn(usize) -> f64| (0..200).map(of).collect::<Vec<f64>>();
     let others = [30.0, nominal.temperature_c, 0.0].map(|value| vec![value; 200]);
     let steady = Session::imagined(rows(|k| 1e5 + 0.01 * k as f64), rows(|k| 0.05 * k as f64), others);
-    let among = extended.predict(&[&sessions[..], &[steady.clone()]].concat(), &nominal, None).pop().unwrap();
+    let among =
+        extended.predict(&[&sessions[..], std::slice::from_ref(&steady)].concat(), &nominal, None).pop().unwrap();
     let alone = extended.predict(&[steady], &nominal, None).pop().unwrap();
     for (a, b) in alone.recalibrated_arcsec.iter().zip(&among.recalibrated_arcsec) {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
