@@ -180,7 +180,7 @@ mod tests {
         let made = calibrate(&[learnt], &Prior::of_ratio(50.0, GeneratorKind::Cam)).unwrap();
         let table = Table::check(&made.table.image).unwrap();
         let said = |posture: f64| {
-            let rows = read("b.csv", log(posture).as_bytes(), &ColumnMap::default(), &table, 20.0).unwrap().rows;
+            let rows = read("b.csv", log(posture).as_bytes(), &ColumnMap::default(), &table, 20.0, true).unwrap().rows;
             replay(&table, &rows).1.remarks.join("\n")
         };
         assert!(!said(upright).contains("posture"), "{}", said(upright));

@@ -229,7 +229,9 @@ pub struct RowsRead {
     pub notes: Vec<String>,
 }
 
-/// Reads measured rows of the drive of a table; `temperature_c` stands where the file has no such column.
+/// Reads measured rows of the drive of a table; `temperature_c` stands where the file has no such column. With
+/// `on_zero` a generator that started at another zero is put on that of the table: not where something is judged that
+/// is played without a zero of its own.
 ///
 /// # Errors
 /// They cannot be read, their torque is in another unit, or they are of another ratio.
@@ -239,9 +241,11 @@ pub fn read(
     columns: &ColumnMap,
     table: &Table<'_>,
     temperature_c: f64,
+    on_zero: bool,
 ) -> Result<RowsRead, MeasuredError> {
     let nominal = Nominal::of_table(table);
-    rows_of(on_zero_of(table, parse_known(file, bytes, columns, &nominal, Some(table))?), nominal.ratio, temperature_c)
+    let recording = parse_known(file, bytes, columns, &nominal, Some(table))?;
+    rows_of(if on_zero { on_zero_of(table, recording) } else { recording }, nominal.ratio, temperature_c)
 }
 
 /// The rows of a recording, if a table can be played over them.

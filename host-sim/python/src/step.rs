@@ -385,7 +385,7 @@ impl Table {
         temperature_c: f64,
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
         let bytes = std::fs::read(file).map_err(|error| bad(format!("{file}: {error}")))?;
-        let read = read(file, &bytes, &ColumnMap::default(), self.table(), temperature_c).map_err(bad)?;
+        let read = read(file, &bytes, &ColumnMap::default(), self.table(), temperature_c, true).map_err(bad)?;
         self.replayed(py, read, RowsOf::beside(std::path::Path::new(file), &bytes))
     }
 

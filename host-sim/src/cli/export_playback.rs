@@ -164,7 +164,7 @@ impl PlaybackOptions {
         section: TableSection<'_>,
         curve: Option<&Curve>,
     ) -> Result<(PlaybackResidual, Vec<String>), Failure> {
-        let RowsRead { rows, faults, notes } = measured(data, &self.logs, section.table, section.temperature_c)?;
+        let RowsRead { rows, faults, notes } = measured(data, &self.logs, section.table, section.temperature_c, false)?;
         let (replayed, summary) = replay(section.table, &rows);
         let faults = faults.into_iter().map(|fault| fault.what);
         let mut notes: Vec<String> = faults.chain(notes).chain(summary.remarks).collect();

@@ -53,7 +53,7 @@ impl Replay {
         self.check_rows(rows_of.as_ref(), &table)?;
         // Found out before the rows are read.
         context.out()?;
-        let RowsRead { rows, faults, notes } = measured(&self.data, &self.logs, &table, self.temperature_c)?;
+        let RowsRead { rows, faults, notes } = measured(&self.data, &self.logs, &table, self.temperature_c, true)?;
         let (replayed, mut summary) = replay(&table, &rows);
         (summary.data_faults, summary.notes) = (faults, notes);
         summary.command.clone_from(&context.command);
@@ -91,15 +91,16 @@ impl Replay {
     }
 }
 
-/// The rows of a log, checked as those of a diagnosis.
+/// The rows of a log, checked as those of a diagnosis; `on_zero` as [`read`] takes it.
 pub(super) fn measured(
     data: &Path,
     logs: &LogOptions,
     table: &Table<'_>,
     temperature_c: f64,
+    on_zero: bool,
 ) -> Result<RowsRead, Failure> {
     let bytes = std::fs::read(data).map_err(bad_file(data))?;
-    read(&data.display().to_string(), &bytes, &logs.map()?, table, temperature_c).map_err(bad_input)
+    read(&data.display().to_string(), &bytes, &logs.map()?, table, temperature_c, on_zero).map_err(bad_input)
 }
 
 fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {
