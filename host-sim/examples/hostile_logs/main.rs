@@ -130,7 +130,7 @@ impl Bench {
             Ok(table) => table,
             Err(error) => return (101, error.to_string()),
         };
-        match read("log.csv", bytes, &ColumnMap::default(), &table, 20.0) {
+        match read("log.csv", bytes, &ColumnMap::default(), &table, 20.0, true) {
             Ok(read) => {
                 let (replayed, summary) = replay(&table, &read.rows);
                 let whole = replayed.len() == read.rows.len() && summary.rows == read.rows.len();
