@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flexspline::Table;
 use serde::{Deserialize, Serialize};
 
+use super::flank_lag::{behind, flank_lag};
 use super::rows::Rows;
 use crate::least_squares::FreeSpan;
 use crate::nominal::Nominal;
@@ -145,13 +146,11 @@ pub(crate) struct Base {
 
 /// The parameter that floats where angles are read at other instants than is known, s.
 pub const BETWEEN_READINGS: &str = "time between the readings";
-/// What floats as the output takes a time to go to its other flank, s: its lag.
+/// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as
+/// this time says. Beside the lag that the rows tell best (`flank_lag`) it is that lag to first order.
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
-/// How much the longer of [`FLANKS_S`] has of that.
-const SLOW_CHANGE_OF_FLANK: &str = "slow share of a change of flank";
-/// A lag of a change of flank is the sum of these two, s. *Chosen*: at 500 rows a second any of 2 to 20 ms comes out
-/// within a fifth. A load behind a clearance takes some milliseconds, and what takes longer swings.
-const FLANKS_S: [f64; 2] = [3e-3, 20e-3];
+/// The output goes from one flank to the other in some milliseconds. *Guess*.
+pub(super) const FLANK_S: f64 = 5e-3;
 /// Prior standard deviation of what no drawing fixes, arcsec: the offset of the output encoder. *Guess*: 2.8°, so wide
 /// that the data alone decide.
 pub(super) const FREE: f64 = 1e4;
@@ -167,11 +166,11 @@ const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction. *Guess*: friction of a unit is known to a
 /// quarter.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
-/// A clearance is crossed within this time, s. *Guess*: four times the longest of [`FLANKS_S`].
+/// A clearance is crossed within this time, s. *Guess*: many times the 5 ms of [`FLANK_S`].
 const CROSSING_S: f64 = 0.08;
 /// A clearance may be this many times as wide as the nominal one before anything else is known. *Guess*: wear and
 /// tolerances rarely add more than half.
-const WIDER: f64 = 1.6;
+pub(super) const WIDER: f64 = 1.6;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about. *Guess*: two
 /// thirds of the rows are enough to fit.
 const UNCERTAIN_AT_MOST: f64 = 0.35;
@@ -226,14 +225,11 @@ impl Base {
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         // No output is on its other flank at once.
         if rows.recorded.time {
-            let [fast, slow] = FLANKS_S.map(|lag_s| {
-                let reached = rows.lagged(&flank, lag_s, false).into_iter().zip(&flank);
-                reached.map(|(reached, flank)| half_backlash * (reached - flank)).collect::<Vec<f64>>()
-            });
-            let per_s: Vec<f64> = fast.into_iter().map(|arcsec| arcsec / FLANKS_S[0]).collect();
-            let slower = slow.into_iter().zip(&per_s).map(|(slow, per_s)| slow - FLANKS_S[1] * per_s);
-            add(SLOW_CHANGE_OF_FLANK, slower.collect(), 1.0);
-            add(CHANGE_OF_FLANK, per_s, FLANKS_S[1]);
+            let left: Vec<f64> =
+                rows.error.iter().zip(&prediction).map(|(error, predicted)| error - predicted).collect();
+            let lag_s = flank_lag(rows, &left, &flank, half_backlash);
+            let per_s = behind(rows, &flank, half_backlash, lag_s).into_iter().map(|arcsec| arcsec / lag_s);
+            add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
         }
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
