@@ -80,7 +80,7 @@ pub struct SplitPart {
 pub struct WaveShare {
     /// Whose turn: `output` or `generator`.
     pub turn: &'static str,
-    /// SplitWaves in a turn.
+    /// Waves in a turn.
     pub order: u32,
     /// Amplitude, arcsec.
     pub amplitude_arcsec: f64,
@@ -126,7 +126,7 @@ pub(super) fn recorded_changes(
     all.into_iter().filter(|(_, recorded)| *recorded).map(|(part, _)| sized(part)).collect()
 }
 
-/// SplitWaves that are handed out.
+/// Waves that are handed out, and what is known of them.
 pub(super) struct SplitWaves<'a> {
     pub model: &'a Model,
     pub known: &'a ModelUncertainty,
