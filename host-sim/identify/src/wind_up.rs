@@ -48,8 +48,7 @@ impl<'t> WindUpCurve<'t> {
             let error = self.table.steady_error_rad(generator, torque_n_m as f32, temperature_c as f32, way);
             error.map_or(f64::NAN, f64::from)
         };
-        let ends = |torque_n_m: f64| [Direction::Forward, Direction::Backward].map(|way| steady(torque_n_m, way));
-        let [forward, backward] = ends(self.torque_n_m);
+        let [forward, backward] = [Direction::Forward, Direction::Backward].map(|way| steady(self.torque_n_m, way));
         if !(error_rad + forward + backward + half_width_rad).is_finite() {
             return [f64::NAN; 3];
         }
@@ -59,9 +58,10 @@ impl<'t> WindUpCurve<'t> {
         let range = self.table.torque_range_n_m().map(f64::from);
         let load = |error: f64, offset: f64| {
             let s = (offset / half).clamp(-1.0, 1.0);
+            // Both flanks are asked only where the output rests between them.
             let at = |torque: f64| {
-                let [forward, backward] = ends(torque);
-                0.5 * ((1.0 - s) * forward + (1.0 + s) * backward)
+                let of = |share: f64, way: Direction| if share > 0.0 { share * steady(torque, way) } else { 0.0 };
+                0.5 * (of(1.0 - s, Direction::Forward) + of(1.0 + s, Direction::Backward))
             };
             load_of(at, range, error)
         };
