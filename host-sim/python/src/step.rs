@@ -253,10 +253,7 @@ impl Table {
             let angle = GeneratorAngle::from_rad(generator[row]).unwrap_or(GeneratorAngle::ZERO);
             table.forward(play, angle, torque.at(row) as f32, temperature.at(row) as f32)
         };
-        if let Some(direction) = &direction {
-            let signs = Column::new("direction", input("direction", direction)?, rows)?;
-            let sides = directions(signs.values)?;
-            let sides = Column { values: &sides, step: signs.step };
+        if let Some(sides) = Directions::new(direction.as_ref(), rows)? {
             return for_rows(py, rows, |row| put(row, at(row, &mut CoreState::after_motion(sides.at(row)))));
         }
         let mut play = state.map_or(CoreState::unknown(), PlayState::get);
@@ -298,10 +295,7 @@ impl Table {
             uncertainty[row] = said.uncertainty_rad;
             quality[row] = said.quality as u8;
         };
-        if let Some(direction) = &direction {
-            let signs = Column::new("direction", input("direction", direction)?, rows)?;
-            let sides = directions(signs.values)?;
-            let sides = Column { values: &sides, step: signs.step };
+        if let Some(sides) = Directions::new(direction.as_ref(), rows)? {
             return for_rows(py, rows, |row| put(row, Approach::Moving(sides.at(row))));
         }
         let play = state.map_or(CoreState::unknown(), PlayState::get);
@@ -335,11 +329,10 @@ impl Table {
         let high = output("high_n_m", &mut high_n_m, rows)?;
         angles("generator_rad", generator)?;
         let ratio = table.drive().exact_ratio();
-        let sides = direction.as_ref().map(|direction| directions(input("direction", direction)?)).transpose()?;
-        let sides = sides.as_ref().map(|sides| Column::new("direction", sides, rows)).transpose()?;
+        let sides = Directions::new(direction.as_ref(), rows)?;
         let mut wind_up = WindUpCurve::new(table, state.map_or(CoreState::unknown(), PlayState::get));
         for_rows(py, rows, |row| {
-            if let Some(sides) = sides {
+            if let Some(sides) = &sides {
                 wind_up = WindUpCurve::new(table, CoreState::after_motion(sides.at(row)));
             }
             let error = reading.at(row) - generator[row] / ratio;
@@ -430,6 +423,23 @@ impl Table {
     }
 }
 
-fn directions(signs: &[i8]) -> PyResult<Vec<Direction>> {
-    signs.iter().map(|sign| direction_of(i32::from(*sign))).collect()
+/// The direction of each row, or one for all.
+struct Directions {
+    sides: Vec<Direction>,
+    /// As of a [`Column`].
+    step: usize,
+}
+
+impl Directions {
+    fn new(signs: Option<&In<'_, i8>>, rows: usize) -> PyResult<Option<Directions>> {
+        let Some(signs) = signs else { return Ok(None) };
+        let Column { values, step } = Column::new("direction", input("direction", signs)?, rows)?;
+        let sides = values.iter().map(|sign| direction_of(i32::from(*sign))).collect::<PyResult<_>>()?;
+        Ok(Some(Directions { sides, step }))
+    }
+
+    #[inline(always)]
+    fn at(&self, row: usize) -> Direction {
+        self.sides[row * self.step]
+    }
 }
