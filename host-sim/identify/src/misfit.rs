@@ -18,7 +18,7 @@ const LOOKED_AT: usize = 2000;
 /// The zero is said to be off if another turn leaves less than this share of what the table leaves as the rows
 /// stand. *Guess*: of an output eccentric once a turn a zero that is off by a turn of hundred leaves a sixteenth of it,
 /// which is next to nothing beside a residual.
-const LEAVES: f64 = 0.7;
+pub(crate) const LEAVES: f64 = 0.7;
 /// Turns that leave less than this share more than the best are as likely. *Guess*.
 const AS_LIKELY: f64 = 1.05;
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, check_ratio_of, on_zero_of};
+use crate::calibrate::{CalibrationError, INSIDE, MOST_ERROR_RAD, OF_95, check_ratio_of, on_zero_of};
 use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment, quantile_of, white_noise,
@@ -350,11 +350,6 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
     summary.of_rows(None, table);
     (replayed, summary)
 }
-
-/// Share of the rows whose error lies inside the half width that an interval of their torque is of, and that in
-/// standard deviations of noise, by definition.
-const INSIDE: f64 = 0.95;
-const OF_95: f64 = 1.96;
 
 /// Puts in the torques that the wind-up says, the mean residual taken for the zero of the output. The intervals are of
 /// what the table leaves of the rows; without a torque, of the noise of the rows and of what the table leaves of its

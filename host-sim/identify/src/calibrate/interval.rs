@@ -22,7 +22,7 @@ use crate::linear::{Gram, Prior, Solution, solve};
 use crate::measurement::{median_of, white_noise};
 
 /// Standard deviations of an interval that holds 95 %.
-pub(super) const OF_95: f64 = 1.96;
+pub(crate) const OF_95: f64 = 1.96;
 /// Rows are close if the highest order turns by no more than this from one to the next: an eighth of its wave.
 const CLOSE_RAD: f64 = PI / 4.0;
 /// Rows that hang together are looked for in stretches of these lengths, as long as there are this many stretches.

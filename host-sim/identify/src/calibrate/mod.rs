@@ -31,11 +31,13 @@ use flexspline_make::{ProjectError, WriteError};
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
+use crate::misfit::LEAVES;
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use flexspline_mechanics::drive::GeneratorKind;
 use folds::{Chosen, Folds};
+pub(crate) use interval::OF_95;
 pub use interval::{ModelUncertainty, Node, RowNoise};
 use parts::usual_arcsec;
 pub use parts::{PartName, Scales, State};
@@ -49,6 +51,7 @@ use split::SplitWaves;
 pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
 
 use together::{Agreement, Starts};
+pub(crate) use torque::INSIDE;
 pub use torque::WindUpTorque;
 pub(crate) use zero::Alignment;
 
@@ -547,9 +550,8 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     pieces
 }
 
-/// With another zero a table leaves less than this share of the rms, … *Guess*: that of whole turns in `misfit`.
-const OTHER_START: f64 = 0.7;
-/// … and the generator is off by more than this beyond the interval, deg. *Guess*: a degree moves a table by little.
+/// A generator that started elsewhere is off by more than this beyond the interval, deg. *Guess*: a degree moves a table
+/// by little.
 const LEAST_START_DEG: f64 = 1.0;
 
 /// A log with each piece that has a zero of its own on the zero of a table, where its waves tell that. Whole turns
@@ -564,7 +566,7 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         let starts_elsewhere = |found: &Alignment| {
             let off_deg = zero::within(found.generator_zero_deg, 360.0).abs();
             let other = off_deg > found.generator_half_width_deg + LEAST_START_DEG;
-            found.told && other && found.left_after_arcsec < OTHER_START * found.left_before_arcsec
+            found.told && other && found.left_after_arcsec < LEAVES * found.left_before_arcsec
         };
         if let Some(found) = found.filter(starts_elsewhere) {
             let zero_rad = found.generator_zero_deg.to_radians();

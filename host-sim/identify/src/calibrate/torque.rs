@@ -13,7 +13,7 @@ use flexspline_base::robust::rms;
 use flexspline_base::statistics::mean;
 
 /// Share of the rows whose interval is to hold their torque, by definition.
-const INSIDE: f64 = 0.95;
+pub(crate) const INSIDE: f64 = 0.95;
 
 /// Torque from the wind-up against that recorded, rows in steady motion, each by a fit without its fold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
