@@ -1,5 +1,6 @@
 //! The core's step over numpy arrays: the crate `flexspline` row by row, without the GIL.
 
+use std::ops::Deref;
 use std::sync::{Mutex, PoisonError};
 
 use flexspline::{Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, Table as CoreTable};
@@ -103,14 +104,14 @@ pub(crate) fn direction_of(sign: i32) -> PyResult<Direction> {
 
 /// A column of input: a value for each row, or one for all.
 #[derive(Clone, Copy)]
-struct Column<'a, T> {
-    values: &'a [T],
+struct Column<V> {
+    values: V,
     /// 0 where one value is for all rows.
     step: usize,
 }
 
-impl<'a, T: Copy> Column<'a, T> {
-    fn new(name: &str, values: &'a [T], rows: usize) -> PyResult<Column<'a, T>> {
+impl<T: Copy, V: Deref<Target = [T]>> Column<V> {
+    fn new(name: &str, values: V, rows: usize) -> PyResult<Column<V>> {
         match values.len() {
             found if found == rows => Ok(Column { values, step: 1 }),
             1 => Ok(Column { values, step: 0 }),
@@ -253,7 +254,7 @@ impl Table {
             let angle = GeneratorAngle::from_rad(generator[row]).unwrap_or(GeneratorAngle::ZERO);
             table.forward(play, angle, torque.at(row) as f32, temperature.at(row) as f32)
         };
-        if let Some(sides) = Directions::new(direction.as_ref(), rows)? {
+        if let Some(sides) = directions(direction.as_ref(), rows)? {
             return for_rows(py, rows, |row| put(row, at(row, &mut CoreState::after_motion(sides.at(row)))));
         }
         let mut play = state.map_or(CoreState::unknown(), PlayState::get);
@@ -295,7 +296,7 @@ impl Table {
             uncertainty[row] = said.uncertainty_rad;
             quality[row] = said.quality as u8;
         };
-        if let Some(sides) = Directions::new(direction.as_ref(), rows)? {
+        if let Some(sides) = directions(direction.as_ref(), rows)? {
             return for_rows(py, rows, |row| put(row, Approach::Moving(sides.at(row))));
         }
         let play = state.map_or(CoreState::unknown(), PlayState::get);
@@ -329,7 +330,7 @@ impl Table {
         let high = output("high_n_m", &mut high_n_m, rows)?;
         angles("generator_rad", generator)?;
         let ratio = table.drive().exact_ratio();
-        let sides = Directions::new(direction.as_ref(), rows)?;
+        let sides = directions(direction.as_ref(), rows)?;
         let mut wind_up = WindUpCurve::new(table, state.map_or(CoreState::unknown(), PlayState::get));
         for_rows(py, rows, |row| {
             if let Some(sides) = &sides {
@@ -423,23 +424,10 @@ impl Table {
     }
 }
 
-/// The direction of each row, or one for all.
-struct Directions {
-    sides: Vec<Direction>,
-    /// As of a [`Column`].
-    step: usize,
-}
-
-impl Directions {
-    fn new(signs: Option<&In<'_, i8>>, rows: usize) -> PyResult<Option<Directions>> {
-        let Some(signs) = signs else { return Ok(None) };
-        let Column { values, step } = Column::new("direction", input("direction", signs)?, rows)?;
-        let sides = values.iter().map(|sign| direction_of(i32::from(*sign))).collect::<PyResult<_>>()?;
-        Ok(Some(Directions { sides, step }))
-    }
-
-    #[inline(always)]
-    fn at(&self, row: usize) -> Direction {
-        self.sides[row * self.step]
-    }
+/// The direction of each row, or one for all, if it is given.
+fn directions(signs: Option<&In<'_, i8>>, rows: usize) -> PyResult<Option<Column<Vec<Direction>>>> {
+    let Some(signs) = signs else { return Ok(None) };
+    let Column { values, step } = Column::new("direction", input("direction", signs)?, rows)?;
+    let values = values.iter().map(|sign| direction_of(i32::from(*sign))).collect::<PyResult<_>>()?;
+    Ok(Some(Column { values, step }))
 }

@@ -550,8 +550,8 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     pieces
 }
 
-/// A generator that started elsewhere is off by more than this beyond the interval, deg. *Guess*: a degree moves a table
-/// by little.
+/// A generator that started elsewhere is off by more than this beyond the interval, deg. *Guess*: a degree moves a
+/// table by little.
 const LEAST_START_DEG: f64 = 1.0;
 
 /// A log with each piece that has a zero of its own on the zero of a table, where its waves tell that. Whole turns
