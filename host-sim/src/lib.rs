@@ -162,7 +162,7 @@
 #![forbid(unsafe_code)]
 
 // Describe a drive.
-pub use flexspline_design::catalogue::{nearest_sheet, sizes_in_words};
+pub use flexspline_design::catalogue::{sheet as catalogue_sheet, sizes_in_words};
 pub use flexspline_design::stated::Stated;
 pub use flexspline_identify::nominal::Nominal;
 pub use flexspline_mechanics::drive::{AsBuilt, Drive, DriveError, FewNumbers, GeneratorKind, UnknownGenerator};

@@ -162,8 +162,9 @@ impl Stated {
         };
         stated.source = section.given(file, "source", text);
         stated.completes_model = section.given(file, "completes_model", yes_or_no);
-        // The rated torque may be below T2: catalogues have it so for some sizes at ratio 50 (CSG-32-50 and CSG-40-50).
-        for (name, above) in [("t2", stated.t2_n_m), ("rated_torque", stated.rated_torque_n_m)] {
+        // The rated torque may be below T2, even T1: catalogues have it so at i = 50 (CSG-32-50, HFUC-90-50).
+        let rated_n_m = stated.rated_torque_n_m.filter(|_| stated.t2_n_m.is_none());
+        for (name, above) in [("t2", stated.t2_n_m), ("rated_torque", rated_n_m)] {
             if let (Some(t1), Some(above)) = (stated.t1_n_m, above)
                 && t1 >= above
             {

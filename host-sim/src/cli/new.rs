@@ -9,7 +9,8 @@ use super::context::quoted;
 use super::made::{Clearance, cup_and_balls, left_out, with_formulas, with_s_teeth};
 use super::{Context, Failure, bad_input, say};
 use flexspline_base::output::write_whole;
-use flexspline_design::catalogue;
+use flexspline_base::suggest::UnknownName;
+use flexspline_design::catalogue::{self, SERIES};
 use flexspline_design::relief::relieve_tips;
 use flexspline_design::simulate::TipContact;
 use flexspline_design::stated::{Stated, TEMPLATE};
@@ -163,10 +164,10 @@ impl New {
         Ok((context.with_sets(made.drive)?, sheet))
     }
 
-    /// The data sheet of the size that the drive is like, or of the nearest ratio of that size.
+    /// The data sheet of the size that the drive is like.
     fn sheet(&self) -> Option<Stated> {
         let (series, size, ratio) = self.like.as_deref().and_then(size_and_ratio)?;
-        catalogue::nearest_sheet(series, size, ratio).map(|(stated, _)| stated)
+        catalogue::sheet(series, size, ratio)
     }
 
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
@@ -355,12 +356,17 @@ impl New {
         let bad = |what: String| Err(Failure::BadInput(what));
         let few = |teeth, module_mm| FewNumbers { teeth, module_mm, bore_mm: self.bore, generator: self.generator };
         if let Some(name) = &self.like {
-            let Some((_, size, ratio)) = size_and_ratio(name) else {
+            let Some((series, size, ratio)) = size_and_ratio(name) else {
                 return bad(format!(
                     "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to \
                      320; a built-in drive goes with --drive"
                 ));
             };
+            if catalogue::series(series).is_none() {
+                let unknown =
+                    UnknownName { what: "--like: found the series", found: series.to_owned(), known: &SERIES };
+                return Err(bad_input(unknown));
+            }
             if self.ratio.is_some_and(|asked| asked.abs() != f64::from(ratio)) {
                 return bad(format!(
                     "--ratio: found {:?}, allowed: {ratio}, as {name} has it",
