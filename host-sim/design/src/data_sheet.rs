@@ -15,7 +15,7 @@ use crate::pitch_wave::peak_to_peak;
 use crate::simulate::{TipContact, peak_stress};
 use flexspline_base::robust::least_and_most;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::drive::{Drive, GeneratorKind, Generators};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
@@ -95,6 +95,58 @@ pub(crate) fn either_way_rad(drive: &Drive, table: &Table<'_>, torque_n_m: f64) 
     let temperature = drive.temperature.reference_c as f32;
     let at = |direction| table.steady_error_rad(GeneratorAngle::default(), torque_n_m as f32, temperature, direction);
     Some([at(Direction::Forward)?, at(Direction::Backward)?].map(f64::from))
+}
+
+/// A part of the wind-up of the output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WindUpPart {
+    /// Which.
+    pub part: &'static str,
+    /// The wind-up that it adds, arcsec, in the sense of the load.
+    pub arcsec: f64,
+    /// Of all of it.
+    pub percent: f64,
+}
+
+/// The wind-up of a drive at rest from first contact to a load, part by part: teeth and rim alone; what sleeve and balls
+/// add, in this order; and the empirical part ([`Drive::contact_wind_up_rad`]).
+///
+/// # Errors
+/// No equilibrium, of the drive or of one without a part.
+pub fn wind_up_parts(
+    drive: &Drive,
+    kind: GeneratorKind,
+    temperature_c: f64,
+    torque_n_m: f64,
+    settings: SolverSettings,
+) -> Result<Vec<WindUpPart>, SolveError> {
+    let no_balls =
+        Drive { generator: Generators { bearing_stiffness_n_per_mm3: None, ..drive.generator }, ..drive.clone() };
+    let bare = Drive { sleeve: Drive::hhd_95_plane().sleeve, ..no_balls.clone() };
+    let touch = touch_n_m(drive, Loads::up_to(torque_n_m.abs())).copysign(torque_n_m);
+    let wind_up = |drive: &Drive| -> Result<[f64; 2], SolveError> {
+        let problem = Problem::new(drive, kind, temperature_c, settings)?;
+        let mut motion = Motion::deformed_or_turned_in(&problem, 0.0)?;
+        let at = [touch, torque_n_m].map(|torque| motion.load(torque).map(|()| motion.error_rad()));
+        let [touched, loaded] = at;
+        let beside_fem = |torque| problem.drive.contact_wind_up_rad(torque);
+        let empirical = beside_fem(torque_n_m) - beside_fem(touch);
+        Ok([loaded? - touched? - empirical, empirical])
+    };
+    let ([teeth, _], [cup, _], [balls, empirical]) = (wind_up(&bare)?, wind_up(&no_balls)?, wind_up(drive)?);
+    let whole = balls + empirical;
+    let parts = [
+        ("teeth and rim", teeth),
+        ("cup or sleeve", cup - teeth),
+        ("balls", balls - cup),
+        ("empirical (contact_compliance)", empirical),
+    ];
+    let of = |(part, rad): (&'static str, f64)| WindUpPart {
+        part,
+        arcsec: rad * ARCSEC_PER_RAD,
+        percent: 100.0 * rad / whole,
+    };
+    Ok(parts.map(of).to_vec())
 }
 
 /// A light touch, N·m.

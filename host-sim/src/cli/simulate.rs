@@ -12,6 +12,7 @@ use flexspline_base::figures;
 use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
 use flexspline_base::progress::Progress;
 use flexspline_design::cautions::{Caution, add_stress};
+use flexspline_design::data_sheet::wind_up_parts;
 use flexspline_design::simulate::{
     Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings, Summary,
     read_path, simulate, stress_by_place,
@@ -178,6 +179,15 @@ impl Simulate {
             let _bar = context.progress("figures of the data sheet");
             beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
         });
+        let summary = &mut simulation.summary;
+        if let Some(torque_n_m) = summary.torque_n_m.filter(|_| summary.wind_up_arcsec.is_some())
+            && drive.output.contact_compliance > 0.0
+        {
+            let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
+            // Without cup and balls preloaded teeth may find no equilibrium: then there are no parts to show.
+            let parts = wind_up_parts(&drive, settings.generator, temperature_c, torque_n_m, settings.solver);
+            summary.wind_up_parts = parts.unwrap_or_default();
+        }
         let sheet = simulation.summary.data_sheet.as_ref();
         let largest = simulation.rows.iter().map(|row| row.torque_n_m.abs()).fold(0.0, f64::max);
         simulation
@@ -328,7 +338,9 @@ fn phase(phase: Phase) -> &'static str {
 /// An increment in one line.
 fn line(now: &Observation) -> String {
     let state = now.state;
-    let error = (state.output_rad - state.generator_rad / now.problem.drive.ratio()).to_degrees() * 3600.0;
+    let drive = &now.problem.drive;
+    let output_rad = state.output_rad + drive.contact_wind_up_rad(state.torque_n_m);
+    let error = (output_rad - state.generator_rad / drive.ratio()).to_degrees() * 3600.0;
     format!(
         "{:<20} {:>5}/{}  generator {:+.6} rad  load {:+.3} N.m  error {error:+.4}\"  {} iterations",
         phase(now.phase),

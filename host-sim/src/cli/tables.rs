@@ -144,7 +144,7 @@ impl Tables {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
             return kernels::run(context, generators, settings);
         }
-        let (drive, stated) = match &self.like {
+        let (mut drive, stated) = match &self.like {
             Some(_) if context.has_drive() => {
                 return Err(Failure::BadInput("--like: found it beside --drive; give one of the two".to_owned()));
             }
@@ -152,6 +152,10 @@ impl Tables {
             None => (context.drive()?, context.stated()?),
         };
         let sheet = self.sheet(stated.as_ref())?;
+        if sheet.is_some() {
+            // The sheet has all that is missing; the regularity over sheets would be added to it.
+            drive.output.contact_compliance = 0.0;
+        }
         if !self.no_report {
             report::before(context, context.out_path(), "tables", Some(&drive));
         }

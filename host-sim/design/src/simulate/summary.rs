@@ -10,6 +10,7 @@ use super::row::Row;
 use super::stress::PeakStress;
 use super::zones::{TipContact, Zone};
 use crate::cautions::Caution;
+use crate::data_sheet::WindUpPart;
 use crate::pitch_wave::peak_to_peak;
 use crate::stated::SheetBeside;
 use flexspline_base::figures::NamedFigure;
@@ -96,6 +97,9 @@ pub struct Summary {
     /// at one place of the tooth pitch and the error a mean over it, so that it is known to about the ripple, which
     /// counts where the wind-up is no more than that.
     pub wind_up_elastic_arcsec: Option<f64>,
+    /// What the wind-up is made of, of a drive with `output.contact_compliance`; left out of any other.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wind_up_parts: Vec<WindUpPart>,
     /// Middle of the backlash at zero load on which `wind_up_arcsec` rests.
     pub backlash_middle_arcsec: Option<f64>,
 
@@ -205,6 +209,10 @@ impl Summary {
         put("wind-up from mid-backlash", self.wind_up_arcsec, arcsec, "", wind_up);
         let elastic = "the same from a light touch on the side that the load pushes to";
         put("wind-up, elastic part", self.wind_up_elastic_arcsec, arcsec, "", elastic);
+        for WindUpPart { part, arcsec: of_it, percent } in &self.wind_up_parts {
+            let (name, caveat) = (format!("wind-up by {part}"), format!("{percent:.0} %"));
+            put(&name, Some(*of_it), arcsec, &caveat, "of the drive at rest, from first contact to the load");
+        }
         let place = self.max_von_mises_wheel.replace('_', " ");
         let place = format!("of the {place}, at step {}", self.max_von_mises_step);
         let grows = "which grows with the mesh";

@@ -15,6 +15,7 @@ use super::turns::{deviation_increments, sweep_turns};
 use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::Stiffness;
 use crate::relief::tips_that_bear;
+use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 
@@ -201,6 +202,15 @@ pub fn make(
     };
     made.info.torque_nodes_resolved = Some(chosen.resolved);
     let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
+    if drive.output.contact_compliance > 0.0 {
+        let empirical = drive.contact_wind_up_rad(largest_n_m) * ARCSEC_PER_RAD;
+        let [_, whole] = made.info.wind_up_arcsec;
+        made.info.remarks.push(format!(
+            "of the wind-up of {whole:.1} arcsec at {largest_n_m} N.m {empirical:.1}, {:.0} %, are empirical \
+             (output.contact_compliance), not FEM",
+            100.0 * empirical / whole
+        ));
+    }
     made.info.cautions = LookedAt {
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),

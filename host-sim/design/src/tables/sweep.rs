@@ -246,7 +246,8 @@ impl<'a> Sampler<'a> {
     }
 
     fn computed(&self, motion: &Motion<'_>) -> Computed {
-        let State { generator_rad, torque_n_m, output_rad, .. } = *motion.state();
+        let State { generator_rad, torque_n_m, .. } = *motion.state();
+        let output_rad = motion.output_rad();
         let (temperature_c, direction) = (self.temperature_c, Direction::Forward);
         let sample = Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad };
         Computed { sample, compliance: motion.last().compliance_rad_per_n_m }
@@ -296,7 +297,7 @@ pub(crate) fn sweep(
         }
         nodes.sort_by(|a, b| a.torque.total_cmp(&b.torque));
         let points: Vec<Computed> = nodes.into_iter().flat_map(|node| node.points).collect();
-        Ok((half.complete(&points, drag_n_m), work))
+        Ok((half.complete(&points, &sampler.problem.drive), work))
     };
     // Temperatures are independent of one another; they are put together in their order.
     let of_temperature = |(k, temperature): (usize, &f32)| match k {
@@ -353,7 +354,9 @@ impl Half {
     }
 
     /// All samples: those computed and those that follow.
-    fn complete(self, points: &[Computed], drag_n_m: f64) -> Vec<Sample> {
+    fn complete(self, points: &[Computed], drive: &Drive) -> Vec<Sample> {
+        let drag_n_m = drive.output.drag_torque_n_m;
+        let beside_fem = |torque_n_m: f64| drive.contact_wind_up_rad(torque_n_m);
         let mut samples: Vec<Sample> = points.iter().map(|point| point.sample).collect();
         if self == Half::ForwardLoaded {
             for point in points {
@@ -365,8 +368,11 @@ impl Half {
                 let below = f64::from((2.0 * drag_n_m - first) as f32);
                 for point in points.iter().filter(|point| point.sample.torque_n_m == first) {
                     let lead = first - drag_n_m;
-                    samples.push(Sample { torque_n_m: below, direction: Direction::Forward, ..mirror(&point.sample) });
-                    samples.push(point.carried(Direction::Backward, below, below + drag_n_m - lead));
+                    let mut lags = Sample { torque_n_m: below, direction: Direction::Forward, ..mirror(&point.sample) };
+                    lags.output_rad += beside_fem(first) + beside_fem(below);
+                    let mut leads = point.carried(Direction::Backward, below, below + drag_n_m - lead);
+                    leads.output_rad += beside_fem(below) - beside_fem(first);
+                    samples.extend([lags, leads]);
                 }
             }
         }
@@ -437,6 +443,27 @@ mod tests {
         rough.flanks.friction_coefficient = 0.08;
         let sampler = coarse(&rough, GeneratorKind::Cam, 4);
         assert!(!sampler.in_motion(&sampler.load(&sampler.unloaded, 5.0, &mut Work::default()).unwrap().last));
+    }
+
+    /// The empirical wind-up is added to every sample by its own load, mirrored and carried ones too.
+    #[test]
+    fn samples_have_the_empirical_wind_up_of_their_load() {
+        let plain = Drive::hhd_95();
+        let winds_up = plain.with_set("output.contact_compliance=5.8").unwrap();
+        let samples = |drive: &Drive| {
+            let sampler = coarse(drive, GeneratorKind::Cam, 4);
+            let loaded = sampler.loaded(&[0.021, 20.0], &mut Work::default()).unwrap();
+            let nodes = sampler.nodes(&loaded, &mut Work::default()).unwrap();
+            let points: Vec<Computed> = nodes.into_iter().flat_map(|node| node.points).collect();
+            Half::of(drive).complete(&points, &sampler.problem.drive)
+        };
+        let (without, with) = (samples(&plain), samples(&winds_up));
+        assert!(without.len() == 48 && with.len() == 48, "{}", with.len());
+        for (a, b) in without.iter().zip(&with) {
+            assert_eq!((a.torque_n_m, a.direction), (b.torque_n_m, b.direction));
+            let (found, due) = (b.output_rad - a.output_rad, winds_up.contact_wind_up_rad(a.torque_n_m));
+            assert!(due != 0.0 && (found - due).abs() < 1e-3 * due.abs(), "{a:?}: {found} and {due}");
+        }
     }
 
     /// All phases of a pitch are sampled, once each, whether their number is even or odd; half of them if no more are

@@ -199,9 +199,9 @@ impl Field {
         matches!(self.path, "flexspline.face" | "flexspline.taper_mrad" | "flexspline.crowning_um")
     }
 
-    /// True for what involutes without preload have not.
+    /// True for what involutes without preload, of a drive that is its FEM alone, have not.
     pub(crate) fn is_of_the_profile(&self) -> bool {
-        matches!(self.path, "flexspline.profile" | "flanks.preload_um")
+        matches!(self.path, "flexspline.profile" | "flanks.preload_um" | "output.contact_compliance")
     }
 
     /// True for what an ideal drive has not.

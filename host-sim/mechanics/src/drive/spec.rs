@@ -131,9 +131,13 @@ section! {
 
 section! {
     /// The output side.
-    OutputLoadPath = output, "what brakes the output beside its load";
+    OutputLoadPath = output, "what brakes the output beside its load, and winds it up beside the FEM";
     /// Coulomb drag on the circular spline, N·m, against its motion.
     drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, against its motion, N.m";
+    /// `κ` of the wind-up in series that drives of catalogues have beside teeth, cup and balls
+    /// ([`Drive::contact_wind_up_rad`]); 0 is none.
+    contact_compliance: Real, from(0.0, 100.0),
+        "kappa of a wind-up in series, kappa (100/i)^(1/2) (T/(E d^3))^(2/3) rad, d the pitch diameter; 0 is none";
 }
 
 section! {
@@ -310,7 +314,7 @@ impl Drive {
                 disc_half_angle_deg: 30.0,
                 bearing_stiffness_n_per_mm3: None,
             },
-            output: OutputLoadPath { drag_torque_n_m: 0.02 },
+            output: OutputLoadPath { drag_torque_n_m: 0.02, contact_compliance: 0.0 },
             sleeve: Sleeve::default(),
             flanks: Flanks { friction_coefficient: 0.0, preload_um: 0.0 },
             temperature: Temperature {
@@ -471,6 +475,21 @@ impl Drive {
     pub fn ratio(&self) -> f64 {
         let (zf, zc) = (f64::from(self.flexspline.teeth), f64::from(self.circular_spline.teeth));
         zc / (zc - zf)
+    }
+
+    /// `κ` of [`Drive::contact_wind_up_rad`] that catalogues have: fitted on K1 to K3 of Harmonic Drive sizes 17 to 40 at
+    /// i = 50 and 80 beside FEM with cup and balls, and within 14 % of the unseen sizes 45 to 90.
+    pub const CATALOGUE_CONTACT: f64 = 5.8;
+
+    /// Wind-up of the output, in the sense of a load (N·m), that is in no model and in every catalogue, rad:
+    /// `φ = κ (100/i)^½ (T/(E d³))^⅔`, `i = z_f/(z_c − z_f)`, `d` the pitch diameter. A regularity over the catalogue
+    /// with a form that closing contacts have (Hertz 1882), not a derivation: exponent and power of the ratio were
+    /// chosen. Odd in the load, without end in compliance at none, so that a table is linear within its least nodes.
+    pub fn contact_wind_up_rad(&self, torque_n_m: f64) -> f64 {
+        let pitch_mm = 2.0 * self.flexspline.pitch_radius_mm();
+        let strain = 1e3 * torque_n_m / (self.material.youngs_modulus_mpa * pitch_mm.powi(3));
+        let low_ratio = (100.0 / (self.ratio() - 1.0)).sqrt();
+        self.output.contact_compliance * low_ratio * strain.abs().powf(2.0 / 3.0).copysign(strain)
     }
 
     /// The drive at another temperature (uniform, but for what [`AsBuilt`] says is warmer than the flexspline): every
@@ -675,6 +694,27 @@ mod tests {
     use super::super::as_built::Harmonic;
     use super::super::interference::RigidMesh;
     use super::*;
+
+    /// Of size 25 at i = 100 catalogues have 0.94' more than FEM where T/size³ is 1e-3 N·m/mm³, and at i = 50 1.38'
+    /// (each by a constant of its own, found without this project's code); half the sense, half the angle's sign.
+    #[test]
+    fn the_empirical_wind_up_is_that_of_catalogues_and_odd() {
+        use super::super::FewNumbers;
+        let of = |teeth: u32| {
+            let few =
+                FewNumbers { teeth, module_mm: 63.5 / f64::from(teeth), bore_mm: None, generator: GeneratorKind::Cam };
+            let drive = few.drive("d").unwrap().drive;
+            assert_eq!(drive.contact_wind_up_rad(15.6), 0.0);
+            drive.with_set("output.contact_compliance=5.8").unwrap()
+        };
+        let arcmin = |drive: &Drive, torque_n_m| drive.contact_wind_up_rad(torque_n_m).to_degrees() * 60.0;
+        let (high, low) = (of(200), of(100));
+        let found = [arcmin(&high, 15.625), arcmin(&low, 15.625)];
+        assert!((found[0] / 0.94 - 1.0).abs() < 0.1 && (found[1] / 1.38 - 1.0).abs() < 0.1, "{found:?}");
+        assert_eq!(high.contact_wind_up_rad(-15.625), -high.contact_wind_up_rad(15.625));
+        assert!((arcmin(&high, 8.0 * 15.625) / found[0] - 4.0).abs() < 1e-9);
+        assert_ne!(high.hash(), of(200).with_set("output.contact_compliance=0").unwrap().hash());
+    }
 
     #[test]
     fn built_in_drives_are_sound_and_have_the_sizes_they_say() {
