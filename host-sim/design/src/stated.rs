@@ -34,6 +34,9 @@ const ARCMIN_PER_RAD: f64 = ARCSEC_PER_RAD / 60.0;
 const POSITIONS: usize = 6;
 /// Steps of the load on the way to the ratcheting torque, and of the unloading of a drive with friction. A guess.
 const STEPS: u32 = 4;
+/// Halvings of such a step on the way to the ratcheting torque, by which the search ends. A guess: the torque is then
+/// known to an eighth of a step.
+const HALVINGS: usize = 3;
 /// Steps over a tooth pitch in which the generator is turned to find the torque that starts it.
 const STARTING_STEPS: usize = 6;
 
@@ -240,29 +243,6 @@ pub struct Beside {
     pub within_scatter: Option<bool>,
     /// Meaning of the computed figure, and what it leaves out.
     pub words: &'static str,
-    /// Why the drive is stiffer than stated; missing where it is not.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reason: Option<String>,
-}
-
-/// Shares of the compliance that a catalogue has, percent, of cup, balls and what is in no model, of K1 and of K2 and
-/// K3: means of CSF sizes 17, 25 and 40, measured (docs/explanation/third_dimension.md, "Beside a catalogue").
-const SHARES_OF_K1: [u32; 3] = [9, 21, 57];
-/// Measured, see [`SHARES_OF_K1`].
-const SHARES_OF_K2_AND_K3: [u32; 3] = [21, 24, 36];
-
-/// Why a drive is stiffer than its data sheet has it, by what is left out of it.
-fn why_stiffer(drive: &Drive, figure: &str) -> Option<String> {
-    let [cup, balls, missing] = match figure {
-        "k1_n_m_per_rad" => SHARES_OF_K1,
-        "k2_n_m_per_rad" | "k3_n_m_per_rad" => SHARES_OF_K2_AND_K3,
-        _ => return None,
-    };
-    let no_cup = (!drive.sleeve.is_shell()).then(|| format!("a cup ({cup} %)"));
-    let no_balls = drive.generator.bearing_stiffness_n_per_mm3.is_none().then(|| format!("balls ({balls} %)"));
-    let never = format!("joints, races out of round and teeth that do not all bear ({missing} %)");
-    let without: Vec<String> = [no_cup, no_balls, Some(never)].into_iter().flatten().collect();
-    Some(format!("stiffer without {}, of a catalogue's compliance", without.join(", ")))
 }
 
 /// A data sheet beside what is computed.
@@ -303,7 +283,7 @@ fn described(figure: &'static str) -> (&'static str, &'static str, &'static [&'s
             "Ratcheting torque",
             "N·m",
             &[],
-            "largest torque at which equilibrium was found, looked for up to the stated one: 1 is held",
+            "largest torque with an equilibrium, looked for up to the stated one by simulate --ratcheting: 1 is held",
         ),
         "starting_torque_n_m" => (
             "Starting torque",
@@ -325,25 +305,27 @@ fn described(figure: &'static str) -> (&'static str, &'static str, &'static [&'s
 /// The key of the load that most figures are for.
 const RATED: &str = "rated_torque_n_m";
 
-/// Computes what is stated, at a temperature.
+/// Computes what is stated, at a temperature; the ratcheting torque, which takes longest, if it is to be `looked_for`.
 pub fn beside(
     drive: &Drive,
     kind: GeneratorKind,
     temperature_c: f64,
     stated: &Stated,
     settings: SolverSettings,
+    looked_for: bool,
 ) -> SheetBeside {
     let loads = stated.loads(drive.rated_torque_n_m(kind));
     let (sheet, done) = data_sheet(drive, kind, temperature_c, loads, POSITIONS, settings);
     let mut why = done.err();
-    let mut further = |wanted: Option<f64>, of: &dyn Fn(&Problem, f64) -> Result<f64, SolveError>| -> Option<f64> {
+    let mut further = |wanted: Option<f64>, of: &dyn Fn(Problem, f64) -> Result<f64, SolveError>| -> Option<f64> {
         let wanted = wanted?;
-        let found = Problem::new(drive, kind, temperature_c, settings).and_then(|problem| of(&problem, wanted));
+        let found = Problem::new(drive, kind, temperature_c, settings).and_then(|problem| of(problem, wanted));
         found.map_err(|error| why.get_or_insert(error)).ok()
     };
-    let loop_arcmin = further(stated.hysteresis_loss_arcmin, &|problem, _| hysteresis_arcmin(problem, loads, &sheet));
-    let held_n_m = further(stated.ratcheting_torque_n_m, &|problem, wanted| held_n_m(problem, loads, wanted));
-    let starting_n_m = further(stated.starting_torque_n_m, &|problem, _| starting_n_m(problem));
+    let loop_arcmin = further(stated.hysteresis_loss_arcmin, &|problem, _| hysteresis_arcmin(&problem, loads, &sheet));
+    let ratcheting = stated.ratcheting_torque_n_m.filter(|_| looked_for);
+    let held_n_m = further(ratcheting, &|problem, wanted| held_n_m(problem, loads, wanted));
+    let starting_n_m = further(stated.starting_torque_n_m, &|problem, _| starting_n_m(&problem));
     let arcmin = |arcsec: Option<f64>| arcsec.map(|x| x / 60.0);
     // The error of tips that clash is no accuracy of the drive.
     let clashes = sheet.tip_contact.is_some_and(|tips| tips.counts());
@@ -365,9 +347,8 @@ pub fn beside(
             let stated = value?;
             let ratio = computed.map(|computed| computed / stated).filter(|ratio| ratio.is_finite());
             let within_scatter = ratio.zip(scatter).map(|(ratio, percent)| (ratio - 1.0).abs() <= 1e-2 * percent);
-            let reason = ratio.filter(|ratio| *ratio > 1.0).and_then(|_| why_stiffer(drive, figure));
             let (_, _, _, words) = described(figure);
-            Some(Beside { figure, stated, computed, ratio, within_scatter, words, reason })
+            Some(Beside { figure, stated, computed, ratio, within_scatter, words })
         })
         .collect();
     SheetBeside {
@@ -409,8 +390,9 @@ fn hysteresis_arcmin(problem: &Problem, loads: Loads, sheet: &DataSheet) -> Resu
 }
 
 /// The largest torque, up to the one that is wanted, at which the drive at rest finds equilibrium.
-fn held_n_m(problem: &Problem, loads: Loads, wanted_n_m: f64) -> Result<f64, SolveError> {
-    let mut motion = Motion::deformed(problem, 0.0)?;
+fn held_n_m(mut problem: Problem, loads: Loads, wanted_n_m: f64) -> Result<f64, SolveError> {
+    problem.settings.max_halvings = HALVINGS;
+    let mut motion = Motion::deformed(&problem, 0.0)?;
     let mut held = 0.0;
     let first = loads.largest_n_m.min(wanted_n_m);
     for k in 0..=STEPS {
@@ -484,8 +466,7 @@ impl SheetBeside {
         let each = off().zip(ratios()).map(|(row, ratio)| format!("{} {ratio:.2}", row.in_words().0));
         let percent = self.stated.unit_scatter_percent.unwrap_or(0.0);
         let way_out = if ratios().all(|ratio| ratio > 1.0) {
-            "; `new --like` prints the command that adds guesses of cup and balls, and tables \
-             --complete-from-data-sheet the rest"
+            "; `new` makes cup, balls and contact_compliance, and tables --complete-from-data-sheet adds the rest"
         } else {
             ""
         };
@@ -551,8 +532,7 @@ impl Beside {
             Some(false) => format!("; outside the ±{percent:.0} % that units scatter"),
             None => String::new(),
         };
-        let reason = self.reason.as_ref().map_or_else(String::new, |reason| format!("; {reason}"));
-        format!("{assumed}{}{scatter}{reason}", self.words)
+        format!("{assumed}{}{scatter}", self.words)
     }
 }
 
@@ -659,7 +639,6 @@ mod tests {
                     ratio: None,
                     within_scatter: None,
                     words: "secant",
-                    reason: None,
                 };
                 assert_eq!(k1.remark(&sheet).contains("at assumed loads"), given & 1 == 0);
             }
@@ -676,7 +655,6 @@ mod tests {
             ratio: Some(ratio),
             within_scatter: Some((ratio - 1.0).abs() <= 0.3),
             words: "secant",
-            reason: None,
         };
         let caution = |k1: f64, k2: f64| {
             let stated = Stated { unit_scatter_percent: Some(30.0), ..Stated::default() };
@@ -691,17 +669,6 @@ mod tests {
         // Softer is further off here, and no sheet completes it.
         let soft = caution(1.5, 0.2).unwrap();
         assert!(soft.value == 0.2 && soft.words.contains("K1 1.50, K2 0.20") && !soft.words.contains("--complete"));
-    }
-
-    /// A feature that a catalogue's drive has and this one lacks is a remark on its stiffness only.
-    #[test]
-    fn the_reason_of_a_stiffness_is_what_the_drive_lacks() {
-        let bare = Drive::hhd_95_plane();
-        let whole = Drive::cup_95().with_set("generator.bearing_stiffness_n_per_mm3=150").unwrap();
-        let of = |drive: &Drive| why_stiffer(drive, "k1_n_m_per_rad").unwrap();
-        assert!(of(&bare).starts_with("stiffer without a cup (9 %), balls (21 %), joints"), "{}", of(&bare));
-        assert!(of(&whole).starts_with("stiffer without joints") && of(&whole).contains("57 %"), "{}", of(&whole));
-        assert_eq!(why_stiffer(&bare, "accuracy_arcmin"), None);
     }
 
     /// CSG-32-50 is rated at 99 N·m, and its T2 is 108 N·m. A rated torque of T2 leaves nothing for K3 either.
@@ -742,7 +709,6 @@ mod tests {
             ratio: Some(ratio),
             within_scatter: None,
             words: "secant",
-            reason: None,
         };
         let beside = vec![row(244_747.3), row(2.447e11), row(0.98)];
         let shown = SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None };
@@ -765,7 +731,7 @@ mod tests {
             unit_scatter_percent: Some(30.0),
             ..Stated::default()
         };
-        let of = |drive: &Drive| beside(drive, GeneratorKind::Cam, 20.0, &stated, coarse());
+        let of = |drive: &Drive| beside(drive, GeneratorKind::Cam, 20.0, &stated, coarse(), true);
         let get =
             |of: &SheetBeside, name: &str| of.beside.iter().find(|row| row.figure == name).unwrap().computed.unwrap();
         let smooth = of(&Drive::hhd_95());

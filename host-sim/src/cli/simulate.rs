@@ -64,6 +64,9 @@ pub(super) struct Simulate {
     /// Which way pitch and turn go [default: forward]
     #[arg(long, value_enum)]
     direction: Option<DirectionOption>,
+    /// Look for the ratcheting torque of the [data_sheet], up to the stated one; up to a minute more
+    #[arg(long)]
+    ratcheting: bool,
     /// Stress in root fillet, on bore and flank over three meshes, with its interval; some seconds more
     #[arg(long)]
     stress: bool,
@@ -177,7 +180,7 @@ impl Simulate {
         simulation.summary.data_sheet = context.stated()?.map(|stated| {
             let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
             let _bar = context.progress("figures of the data sheet");
-            beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
+            beside(&drive, settings.generator, temperature_c, &stated, settings.solver, self.ratcheting)
         });
         let summary = &mut simulation.summary;
         if let Some(torque_n_m) = summary.torque_n_m.filter(|_| summary.wind_up_arcsec.is_some())
@@ -189,6 +192,7 @@ impl Simulate {
             summary.wind_up_parts = parts.unwrap_or_default();
         }
         let sheet = simulation.summary.data_sheet.as_ref();
+        simulation.summary.cautions.splice(0..0, Caution::of_stiffness(&drive, sheet.is_some()));
         let largest = simulation.rows.iter().map(|row| row.torque_n_m.abs()).fold(0.0, f64::max);
         simulation
             .summary
@@ -384,7 +388,7 @@ fn text(summary: &Summary, out: &FilePath, has_frames: bool, has_page: bool) -> 
         summary.drive, summary.generator, summary.path, summary.mesh, summary.degrees_of_freedom
     );
     // Where the figures are not those of the teeth in mesh, that comes first.
-    let is_first = |caution: &&Caution| caution.figure == "tip_contact";
+    let is_first = |caution: &&Caution| ["tip_contact", "stiffness"].contains(&caution.figure);
     for caution in summary.cautions.iter().filter(is_first) {
         let _ = writeln!(text, "caution: {}", caution.words);
     }

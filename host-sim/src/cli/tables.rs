@@ -19,7 +19,7 @@ use flexspline_base::output::Outputs;
 use flexspline_base::spent::Spent;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::catalogue;
-use flexspline_design::cautions::add_stress;
+use flexspline_design::cautions::{Caution, add_stress};
 use flexspline_design::simulate::{Path, PlaceStress, SimulationSettings, simulate};
 use flexspline_design::stated::{Stated, TWO_SETS_OF_K, beside};
 use flexspline_design::tables::sweep::SweepProgress;
@@ -179,12 +179,16 @@ impl Tables {
                 (failure, _) => failure,
             });
         }
-        made.iter_mut().for_each(|table| table.info.cautions.extend(beyond(table.kind)));
+        let stiff = Caution::of_stiffness(&drive, stated.is_some() || self.from_samples.is_some());
+        for MadeTable { kind, info, .. } in &mut made {
+            info.cautions.splice(0..0, stiff.clone());
+            info.cautions.extend(beyond(*kind));
+        }
         if let (Some(stated), None) = (&stated, &self.from_samples) {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
             let reference_c = drive.temperature.reference_c;
             made.par_iter_mut().for_each(|table| {
-                let sheet = beside(&drive, table.kind, reference_c, stated, settings);
+                let sheet = beside(&drive, table.kind, reference_c, stated, settings, false);
                 if table.info.completed.is_none() {
                     table.info.cautions.extend(sheet.caution());
                 }

@@ -21,7 +21,7 @@ use std::ops::ControlFlow;
 use flexspline::Direction;
 use thiserror::Error;
 
-use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
+use crate::cautions::{Caution, LookedAt, rigid_gap_um, room_as_built_arcsec};
 use flexspline_base::spent::Stopwatch;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, ThermalState};
 use flexspline_mechanics::motion::Motion;
@@ -686,6 +686,20 @@ impl<'a> RunState<'a> {
             tip_contact,
             slope_bound: None,
         };
+        let wind_up_arcsec = against(middle).filter(|_| loaded);
+        let friction = self.drive.flanks.friction_coefficient;
+        let against_load = wind_up_arcsec.zip(torque_n_m).filter(|(wind_up, torque)| wind_up * torque < 0.0);
+        let cautions = against_load.filter(|_| friction > 0.0).map(|(value, torque_n_m)| Caution {
+            figure: "wind_up_arcsec",
+            value,
+            limit: 0.0,
+            words: format!(
+                "under {torque_n_m} N.m the output stands {:.0} arcsec against its load: friction between the flanks \
+                 ({friction}) rules the sign, not the stiffness",
+                value.abs()
+            ),
+        });
+        let cautions = looked.cautions().into_iter().chain(cautions).collect();
         let spent = self.begun.spent();
         let summary = Summary {
             schema_version: SUMMARY_SCHEMA,
@@ -738,7 +752,7 @@ impl<'a> RunState<'a> {
             torque_balance_worst_n_m: largest(rows, |row| row.torque_balance_n_m.abs()),
             residual_worst: largest(rows, |row| row.residual),
             room_as_built_arcsec: looked.room_as_built_arcsec,
-            cautions: looked.cautions(),
+            cautions,
             data_sheet: None,
             increments: self.increments,
             iterations: self.iterations,
