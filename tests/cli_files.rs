@@ -106,36 +106,30 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         assert!(!bore || (wheel["root_radius_mm"].as_f64().unwrap() - rim_mm - 31.0).abs() < 1e-3, "{line}");
         assert_eq!(text.contains("as HHD-95\nrim_thickness_mm"), !bore && !line.contains("--set"), "{line}");
     }
-    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints,
-    // which the long form runs as given.
+    // A size that is at hand brings its data sheet; cup and balls are guessed.
     let made = desk.line("new like.toml --like CSG-25-80 --json").done().json();
     assert_eq!(made["data_sheet"]["k2_n_m_per_rad"], 50e3);
-    assert_eq!(made["left_out"].as_array().unwrap().len(), 4);
+    assert!(made["caution"].is_null() && desk.read("like.toml").contains("\nkind = \"cup\""), "{made}");
     assert_eq!(made["teeth"]["clear"].as_array().unwrap().len(), 4);
     assert!(desk.read("like.toml").contains("\nratcheting_torque_n_m = 880.0\n"), "{}", desk.read("like.toml"));
-    let guesses = made["next"][2].as_str().unwrap().strip_prefix("flexspline ").unwrap();
-    assert!(guesses.contains("--like CSG-25-80"), "{guesses}");
-    if flexspline_tests::long() {
-        let with_cup = desk.line(&format!("{guesses} --json")).done().json();
-        assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2);
-    }
-    // What was asked for stays in that command, and what was set is not guessed.
-    let own = "new wide.toml --like CSG-25-80 --bore 62.4 --set flexspline.width_mm=40 --set \
-               generator.bearing_stiffness_n_per_mm3=5000 --json";
-    let guesses = desk.line(own).done().json()["next"][2].as_str().unwrap().to_owned();
-    let with_cup = desk.line(&format!("{} --json", guesses.strip_prefix("flexspline ").unwrap())).done().json();
-    assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2, "{guesses}");
-    let wide = desk.line("drive --drive wide.toml --json").done().json();
-    assert_eq!(wide["drive"]["flexspline"]["width_mm"], 40.0, "{guesses}");
-    assert_eq!(wide["drive"]["generator"]["bearing_stiffness_n_per_mm3"], 5000.0, "{guesses}");
-    assert!(desk.read("wide.toml").contains("half the bore of 62.4"), "{guesses}");
-    // A ratio that is not in the catalogue has the figures of its neighbour.
-    assert!(
-        desk.line("new odd.toml --like CSF-25-90")
-            .done()
-            .stdout
-            .contains("CSF-25-100 (the nearest ratio at hand to 90)")
-    );
+    // What was set is not guessed.
+    let own = "new wide.toml --like CSG-25-80 --bore 62.4 --no-run --set flexspline.width_mm=40 --set \
+               generator.bearing_stiffness_n_per_mm3=5000";
+    desk.line(own).done();
+    let wide = desk.line("drive --drive wide.toml --json").done().json()["drive"].clone();
+    assert_eq!((&wide["flexspline"]["width_mm"], &wide["sleeve"]["kind"]), (&40.0.into(), &"cup".into()));
+    assert_eq!(wide["generator"]["bearing_stiffness_n_per_mm3"], 5000.0);
+    assert_eq!(wide["output"]["contact_compliance"], 5.8);
+    assert!(desk.read("wide.toml").contains("half the bore of 62.4"));
+    // The plane drive says how stiff it is; a ratio between 50 and 80 has nobody's figures.
+    let plane = desk.line("new plane.toml --like CSF-25-60 --plane --json").done().json();
+    assert!(plane["caution"]["words"].as_str().unwrap().contains("5 to 8 times") && plane["data_sheet"].is_null());
+    // Teeth that bind name the number that lets them clear.
+    let binds = "new steep.toml --force --teeth 200 --module 0.3 --no-run --json --set \
+                 flexspline.pressure_angle_deg=15,circular_spline.pressure_angle_deg=15";
+    let clears_with = desk.line(binds).done().json()["clears_with"].as_str().unwrap().to_owned();
+    let mended = desk.line(&format!("{binds},{clears_with}")).done().json();
+    assert!(mended["teeth"]["clear"].as_array().unwrap().len() == 4 && mended["clears_with"].is_null(), "{mended}");
     // S-shaped teeth are drawn for the cam.
     let s = desk.line("new s.toml --like CSG-25-80 --set flexspline.profile=s --json").done().json();
     assert_eq!(s["teeth"]["clear"], serde_json::json!(["cam"]));
@@ -150,6 +144,7 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         ("--teeth 201 --module 0.32", "--teeth: found 201, allowed: an even number"),
         ("--module 0.32", "--module: found alone"),
         ("--like CSF25", "--like: found \"CSF25\""),
+        ("--like CSX-25-100", "did you mean `CSF`?"),
         ("--like CSF-25-100 --ratio 80", "--ratio: found 80.0, allowed: 100, as CSF-25-100 has it"),
         (
             "--teeth 160 --module 0.3 --generator double-disc --set flexspline.profile=s",

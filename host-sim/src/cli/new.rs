@@ -6,11 +6,12 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::context::quoted;
-use super::made::{Clearance, cup_and_balls, left_out, with_formulas, with_s_teeth};
+use super::made::{Clearance, as_sold, with_formulas, with_s_teeth};
 use super::{Context, Failure, bad_input, say};
 use flexspline_base::output::write_whole;
 use flexspline_base::suggest::UnknownName;
 use flexspline_design::catalogue::{self, SERIES};
+use flexspline_design::cautions::Caution;
 use flexspline_design::relief::relieve_tips;
 use flexspline_design::simulate::TipContact;
 use flexspline_design::stated::{Stated, TEMPLATE};
@@ -22,10 +23,10 @@ use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, 
 /// A drive file (the default) has every size, stiffness and imperfection of a drive for the FEM, each with its unit,
 /// meaning, sign and allowed range; as it stands it is the drive that it was made from. --teeth and --module
 /// (or --like, the name of a catalogue's size) make a drive of one's own, whose teeth clear one another; what follows
-/// from them has its formula in the file. With --like its
-/// [data_sheet] is filled in where the catalogue's figures are at hand. What is left out because no catalogue prints it
-/// (cup, balls, friction, errors) is listed in the file and here, with a command that adds guesses of cup and
-/// balls. --set flexspline.profile=s makes S-shaped teeth for the cam. A catalogue model
+/// from them has its formula in the file. It has a cup and balls in proportion, which are guesses since no catalogue
+/// prints them, and from i = 50 to 160 the compliance that catalogues have beside them (output.contact_compliance);
+/// --plane leaves all of it out. With --like its [data_sheet] is filled in where the catalogue's figures are at hand.
+/// Friction and errors of making are left out. --set flexspline.profile=s makes S-shaped teeth for the cam. A catalogue model
 /// (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for
 /// `diagnose --model` and `synthesize --model`.
 #[derive(Debug, Args)]
@@ -67,6 +68,9 @@ pub(super) struct New {
     /// Replace the file if it is there
     #[arg(long)]
     force: bool,
+    /// Without cup, balls and contact_compliance: much stiffer than any drive that is sold
+    #[arg(long)]
+    plane: bool,
     /// Do not run a drive of one's own under its rated load: tips that clash there are then not lowered, nor reported
     #[arg(long)]
     no_run: bool,
@@ -93,14 +97,18 @@ struct NewReport {
     /// Of a drive of one's own: under which generators its teeth clear.
     #[serde(skip_serializing_if = "Option::is_none")]
     teeth: Option<Clearance>,
-    /// Of a drive of one's own: what catalogue drives have and do not print.
-    left_out: Vec<&'static str>,
     /// Catalogue values of a drive that is like one of its sizes, if at hand.
     #[serde(skip_serializing_if = "Option::is_none")]
     data_sheet: Option<Stated>,
-    /// Of a drive of one's own: how its tips passed one another under its rated load, with cup and balls.
+    /// What to know of its stiffness; of a drive file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    caution: Option<Caution>,
+    /// Of a drive of one's own: how its tips passed one another under its rated load.
     #[serde(skip_serializing_if = "Option::is_none")]
     under_load: Option<UnderLoad>,
+    /// Of teeth that bind: the number that lets them clear, for `--set`, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clears_with: Option<String>,
     /// Commands to type next.
     next: Vec<String>,
 }
@@ -155,10 +163,11 @@ impl New {
             generator,
             like: Some(name.to_owned()),
             force: false,
+            plane: false,
             no_run: false,
         };
         let Some((name, few)) = new.few()? else { return Ok((context.drive()?, None)) };
-        let mut made = few.drive(&name).map_err(|error| refused(&error, true))?;
+        let mut made = as_sold(context, few.drive(&name).map_err(|error| refused(&error, true))?)?;
         let sheet = new.sheet();
         new.under_load(context, &mut made, sheet.as_ref())?;
         Ok((context.with_sets(made.drive)?, sheet))
@@ -172,6 +181,7 @@ impl New {
 
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let few = self.few()?;
+        let numbers = few.as_ref().map(|(_, numbers)| *numbers);
         let made = match few {
             Some(_) if context.has_drive() => {
                 let what = "--drive: found it beside --teeth, --module or --like; give one of them";
@@ -179,7 +189,8 @@ impl New {
             }
             Some((name, few)) => {
                 let made = few.drive(&name).map_err(|error| refused(&error, self.like.is_some()))?;
-                Some(if self.asks_for_s_teeth(context)? { with_s_teeth(made)? } else { made })
+                let made = if self.asks_for_s_teeth(context)? { with_s_teeth(made)? } else { made };
+                Some(if self.plane { made } else { as_sold(context, made)? })
             }
             None => None,
         };
@@ -204,18 +215,18 @@ impl New {
         if let Some(teeth) = teeth.as_ref().filter(|_| drive.flexspline.profile == Profile::S) {
             teeth.check_s_teeth()?;
         }
-        let left_out = own.map_or_else(Vec::new, |_| left_out(&drive));
+        let binds = |teeth: &&Clearance| !teeth.clear.contains(&self.generator);
+        let is_involute = drive.flexspline.profile == Profile::Involute;
+        let mended = teeth.as_ref().filter(binds).and(numbers).filter(|_| is_involute);
+        let shift = mended.and_then(|numbers| numbers.shift(&drive).ok());
         let (text, drive_hash, next) = match kind {
             NewKind::Drive => {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
-                let mut next = next_of(&file, teeth.as_ref(), self.generator);
+                let next = next_of(&file, teeth.as_ref(), self.generator);
                 let text = match own {
-                    Some(made) => head(teeth.as_ref(), &left_out) + &with_formulas(made, &drive),
+                    Some(made) => head(teeth.as_ref()) + &with_formulas(made, &drive),
                     None => drive.to_toml(),
                 };
-                if self.like.is_some() && !drive.sleeve.is_shell() && !next.is_empty() {
-                    next.push(self.with_guesses(context, &file, &drive));
-                }
                 let sheet = data_sheet.as_ref().map_or_else(|| TEMPLATE.to_owned(), Stated::to_toml);
                 (text + &sheet, Some(hash), next)
             }
@@ -234,9 +245,10 @@ impl New {
             written: vec![self.file.clone()],
             drive_hash,
             teeth,
-            left_out,
             data_sheet,
+            caution: Caution::of_stiffness(&drive, false).filter(|_| kind == NewKind::Drive),
             under_load,
+            clears_with: shift.map(|shift| format!("circular_spline.profile_shift={shift}")),
             next,
         };
         context.print(&written, || {
@@ -256,7 +268,11 @@ impl New {
 
     /// Teeth, data sheet and what is left out of a drive of one's own, a line each.
     fn more(&self, written: &NewReport) -> String {
-        let mut lines: Vec<String> = written.teeth.iter().map(Clearance::text).collect();
+        let mut lines: Vec<String> = written.caution.iter().map(|of| format!("caution: {}", of.words)).collect();
+        lines.extend(written.teeth.iter().map(Clearance::text));
+        lines.extend(
+            written.clears_with.iter().map(|set| format!("caution: the teeth bind; they clear with --set {set}")),
+        );
         lines.extend(written.under_load.iter().map(UnderLoad::text));
         match (&self.like, &written.data_sheet) {
             (Some(_), Some(sheet)) => {
@@ -277,22 +293,18 @@ impl New {
             )),
             _ => {}
         }
-        lines.extend(written.left_out.iter().map(|what| format!("left out: {what}")));
         lines.iter().map(|line| format!("\n{line}")).collect()
     }
 
-    /// Runs a drive of one's own under its rated load, with guesses of cup and balls where it is to have them and does
-    /// not, and lowers its tips until they pass one another freely. Nothing of a drive that binds as drawn.
+    /// Runs a drive of one's own under its rated load, and lowers its tips until they pass one another freely. Nothing of
+    /// a drive that binds as drawn.
     fn under_load(
         &self,
         context: &Context,
         made: &mut MadeDrive,
         sheet: Option<&Stated>,
     ) -> Result<Option<UnderLoad>, Failure> {
-        let mut drive = context.with_sets(made.drive.clone())?;
-        if self.like.is_some() && !drive.sleeve.is_shell() {
-            drive = drive.with_sets(guesses(context, &drive).iter().map(String::as_str)).map_err(bad_input)?;
-        }
+        let drive = context.with_sets(made.drive.clone())?;
         if !Clearance::of(&drive).map_err(bad_input)?.clear.contains(&self.generator) {
             return Ok(None);
         }
@@ -322,20 +334,6 @@ impl New {
             Err(error) => under.not_solved = Some(error.to_string()),
         }
         Ok(Some(under))
-    }
-
-    /// The command that makes this drive with guesses of cup and balls, of what is not set.
-    fn with_guesses(&self, context: &Context, file: &str, drive: &Drive) -> String {
-        let name = self.like.as_deref().map_or_else(String::new, quoted);
-        let mut words = format!("new {file} --force --like {name}");
-        words += &self.bore.map_or_else(String::new, |bore| format!(" --bore {bore}"));
-        if self.generator != GeneratorKind::Cam {
-            words += &format!(" --generator {}", self.generator);
-        }
-        if self.kind.is_some() {
-            words += " --kind drive";
-        }
-        format!("{} --set {}", context.next(&words), guesses(context, drive).join(","))
     }
 
     /// Whether S-shaped teeth are asked for, which are drawn for the cam.
@@ -440,21 +438,10 @@ const TIP_RADIUS: &str = "flexspline.tip_radius_mm";
 /// The field that says which teeth.
 const PROFILE: &str = "flexspline.profile";
 
-/// Guesses of cup and balls, of what is not set, as PATH=VALUE.
-fn guesses(context: &Context, drive: &Drive) -> Vec<String> {
-    let open = cup_and_balls(drive).into_iter().filter(|(path, _)| !context.sets_field(path));
-    open.map(|(path, value)| format!("{path}={value}")).collect()
-}
-
-/// Head of a file: how its teeth clear, and what it leaves out.
-fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {
-    let mut text: String = teeth.map(|teeth| format!("# As made here, {}.\n", teeth.text())).unwrap_or_default();
-    if !left_out.is_empty() {
-        text += "# Left out, since no catalogue prints it; docs/explanation/third_dimension.md, \"Beside a \
-                 catalogue\", has what each does:\n";
-        text.extend(left_out.iter().map(|what| format!("# - {what}\n")));
-    }
-    text
+/// Head of a file: how its teeth clear, and what no catalogue prints.
+fn head(teeth: Option<&Clearance>) -> String {
+    let teeth = teeth.map_or_else(String::new, |teeth| format!("# As made here, {}.\n", teeth.text()));
+    teeth + "# Friction of the flanks and errors of making ([as_built]) are yours to add: no catalogue prints them.\n"
 }
 
 /// Next commands for a drive file: none that fails. Where teeth bind under a generator nobody wants its table,

@@ -156,7 +156,10 @@ impl FewNumbers {
 
     /// Least profile shift of the circular spline, modules, with which the rigid backlash is at least [`BACKLASH_RAD`]
     /// and no tooth interferes under any of the four generators.
-    fn shift(&self, drive: &Drive) -> Result<f64, DriveError> {
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn shift(&self, drive: &Drive) -> Result<f64, DriveError> {
         let report = |shift: f64, kind| {
             let mut drive = drive.clone();
             drive.circular_spline.profile_shift = shift;
