@@ -1,31 +1,24 @@
 //! Which part of a drive gives how much of its torsion and hysteresis, next to a catalogue:
-//! `catalogue_budget [cone | map] [SIZE …]`
+//! `catalogue_budget [SIZE …]`
 //!
 //! Sizes 17, 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim,
 //! width, clearance and tooth form are those of HHD-95 in proportion, cup and balls are guesses in proportion
-//! (`Guess`): no maker publishes them. Nothing is fitted to the catalogue.
+//! (`CUP`): no maker publishes them. Nothing is fitted to the catalogue.
 //!
-//! Without a word: the same drive by contact FEM with one part more at a time: teeth, rim and cam alone; the cup; the
+//! The same drive by contact FEM with one part more at a time: teeth, rim and cam alone; the cup; the
 //! balls of the generator bearing, each range of torque with the stiffness that the balls have under its mean load. A
 //! difference of compliances is the part's. Then the loop: what flank friction makes of it by contact FEM, with and
 //! without preload, and bounds in closed form of what is not in the FEM (`race_on_bore`, `seal`).
-//!
-//! `cone`: everything at once, the teeth leaning with the cup (`flexspline.face = "slices"`). Involutes and S-shaped
-//! teeth, straight, crowned, and tapered for the cone, each drawn just free of play (`free_of_play`) or deeper, with
-//! its loop and the torque that turns its generator without load.
-//!
-//! `map`: S-shaped crowned teeth free of play, one guess changed at a time.
 
 use std::f64::consts::PI;
 use std::process::ExitCode;
 
 use flexspline_base::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
 use flexspline_mechanics::bearing::Balls;
-use flexspline_mechanics::contact::{Configuration, FlankLaw};
 use flexspline_mechanics::drive::{Drive, FewNumbers, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::stepping::{Face, Method, Problem, SolveError, SolverSettings};
+use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings};
 
 /// Values of the catalogue (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting torque of Schaeffler's
 /// RT1, same sizes).
@@ -43,41 +36,17 @@ const CATALOGUE: [Catalogue; 3] = [
     Catalogue { size: 40, loads_n_m: [54.0, 196.0, 265.0], k_n_m_per_rad: [1.3e5, 2.0e5, 2.3e5], start_n_m: None },
 ];
 
-/// Numbers that no maker publishes.
-#[derive(Clone, Copy)]
-struct Guess {
-    /// Length and wall of the cup over its pitch diameter: about half as long as wide, the wall about a hundredth.
-    length: f64,
-    wall: f64,
-    /// Balls, and their diameter over that of [`Balls::in_proportion`].
-    balls: u32,
-    ball: f64,
-    /// Face width over that of HHD-95 in proportion.
-    width: f64,
-    /// How far both ends of a flank stand back, modules. The skew of the cone moves them by 0.14.
-    crowning: f64,
-    /// How much deeper the flanks mesh than where they come free of play, µm.
-    deeper_um: f64,
-}
-
-const GUESS: Guess =
-    Guess { length: 0.5, wall: 0.011, balls: 23, ball: 1.0, width: 1.0, crowning: 0.1, deeper_um: 0.0 };
+/// Length and wall of the cup over its pitch diameter: about half as long as wide, the wall about a hundredth. Guesses.
+const CUP: [f64; 2] = [0.5, 0.011];
 /// Thickness of the cup's bottom over its wall, hub over the pitch radius. Guesses.
 const BOTTOM: [f64; 2] = [2.0, 0.5];
 /// Flank friction: greased steel.
 const FRICTION: f64 = 0.08;
 /// Load at which the width of the loop is reported, over the rated one: above the drag, below T1.
 const LOOP_SHARE: f64 = 0.04;
-/// Pairs of flanks nearer than this are looked at, mm.
-const NEAR_MM: f64 = 0.02;
-/// Preloads between which flanks come free of play, µm: what a drive may have; and how closely that place is found.
-const PRELOAD_RANGE_UM: [f64; 2] = [-50.0, 50.0];
-const PLAY_UM: f64 = 0.25;
 /// Preloads of S-shaped teeth, µm: drives of the catalogue have no play, and how much deeper their teeth mesh is not
 /// published.
 const PRELOADS_UM: [f64; 2] = [1.0, 3.0];
-/// How much deeper than free of play coned teeth mesh, µm.
-const DEEPER_UM: [f64; 4] = [0.0, 1.0, 3.0, 10.0];
 /// Friction of the bearing's outer race in the bore: greased steel, as on the flanks.
 const RACE_FRICTION: f64 = 0.08;
 /// Friction of a seal's lip for each mm around, N: a lip pressed on with 0.1 N/mm (radial shaft seals: DIN 3760 sizes,
@@ -107,13 +76,8 @@ struct Loaded {
     ball_n: [f64; 3],
     /// Flanks in contact at the end of each range, over the number of teeth.
     share_in_contact: [f64; 3],
-    /// Load along the face of the flank that bears most, there: peak over mean, and the share that bears.
-    peak_over_mean: [f64; 3],
-    share_of_face: [f64; 3],
     /// Sum of all ball loads without load, N.
     sum_n: f64,
-    /// Tilt under the last load of the teeth that bear, mean by their load, mrad.
-    bearing_tilt_mrad: f64,
 }
 
 fn solver() -> SolverSettings {
@@ -122,22 +86,6 @@ fn solver() -> SolverSettings {
 
 fn problem(drive: &Drive) -> Result<Problem, SolveError> {
     Problem::new(drive, GeneratorKind::Cam, drive.temperature.reference_c, solver())
-}
-
-/// Tilt of the teeth that bear, mean by their load, mrad: the rim tilts as it is oval, by the cosine of twice the angle
-/// from the major axis.
-fn bearing_tilt_mrad(motion: &Motion<'_>) -> f64 {
-    let (problem, state) = (motion.problem(), motion.state());
-    let flanks = problem.flanks();
-    let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };
-    let law = FlankLaw { stiffness: problem.settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
-    let mut sums = [0.0; 2];
-    for pair in flanks.near_pairs(at, NEAR_MM) {
-        let load = flanks.evaluate(pair, at, law, &flanks.layout(pair, at).points).map_or(0.0, |found| found.load);
-        let from_axis = problem.flexspline.sector_angle(pair.tooth) - state.generator_rad;
-        sums = [sums[0] + load, sums[1] + load * (2.0 * from_axis).cos()];
-    }
-    1e3 * motion.last().face.tilt_rad * sums[1] / sums[0]
 }
 
 fn loaded(drive: &Drive, loads_n_m: &[f64]) -> Result<Loaded, SolveError> {
@@ -165,11 +113,8 @@ fn loaded(drive: &Drive, loads_n_m: &[f64]) -> Result<Loaded, SolveError> {
         found.k[range] = (to.0 - from.0) / (to.1 - from.1);
         found.ball_n[range] = 0.5 * (from.2 + to.2);
         found.share_in_contact[range] = motion.last().flank_contacts as f64 / f64::from(drive.flexspline.teeth);
-        let Face { peak_over_mean, share, .. } = motion.last().face;
-        (found.peak_over_mean[range], found.share_of_face[range]) = (peak_over_mean, share);
         from = to;
     }
-    found.bearing_tilt_mrad = bearing_tilt_mrad(&motion);
     Ok(found)
 }
 
@@ -194,56 +139,23 @@ fn rough(drive: &Drive) -> Drive {
     rough
 }
 
-/// Torque that turns the generator without load, N·m: what flank friction makes of the forces between flanks.
-fn turning_n_m(drive: &Drive) -> Result<f64, SolveError> {
-    const INCREMENTS: usize = 8;
-    let problem = problem(&rough(drive))?;
-    let mut motion = Motion::deformed(&problem, 0.0)?;
-    let pitch = motion.pitch();
-    motion.settle(pitch / INCREMENTS as f64)?;
-    let places = motion.turn_in(pitch, INCREMENTS)?;
-    Ok(places.iter().map(|place| place.increment.generator_torque_n_m).sum::<f64>() / INCREMENTS as f64)
-}
-
-/// The drive with its flanks as deep as they go without touching while there is no load, and `deeper_um` more; nothing
-/// where they touch with the most clearance that a drive may have.
-fn free_of_play(drive: &Drive, deeper_um: f64) -> Result<Option<Drive>, SolveError> {
-    let mut drive = drive.clone();
-    let mut touches = |preload_um: f64| {
-        drive.flanks.preload_um = preload_um;
-        Ok::<_, SolveError>(Motion::deformed(&problem(&drive)?, 0.0)?.last().flank_contacts > 0)
-    };
-    let [mut free, mut binds] = PRELOAD_RANGE_UM;
-    if touches(free)? {
-        return Ok(None);
-    }
-    while binds - free > PLAY_UM {
-        let middle = 0.5 * (free + binds);
-        *(if touches(middle)? { &mut binds } else { &mut free }) = middle;
-    }
-    drive.flanks.preload_um = free + deeper_um;
-    Ok(Some(drive))
-}
-
 fn row(what: &str, values: [f64; 3], unit: &str) {
     println!("  {what:<46} {:>9.3} {:>9.3} {:>9.3}  {unit}", values[0], values[1], values[2]);
 }
 
 /// A drive as in the catalogue by its plane slice, and in its cup.
-fn plane_and_cup(entry: &Catalogue, guess: &Guess) -> Result<[Drive; 2], Box<dyn std::error::Error>> {
+fn plane_and_cup(entry: &Catalogue) -> Result<[Drive; 2], Box<dyn std::error::Error>> {
     let pitch_mm = 2.54 * f64::from(entry.size);
     let numbers = FewNumbers { teeth: 200, module_mm: pitch_mm / 200.0, bore_mm: None, generator: GeneratorKind::Cam };
     let name = format!("size {}", entry.size);
-    let drive = numbers.drive(&name)?.drive;
-    let width = format!("flexspline.width_mm={}", guess.width * drive.flexspline.width_mm);
-    let plane = drive.with_sets([width.as_str(), "sleeve.kind=none"])?;
-    let wall_mm = guess.wall * pitch_mm;
-    let [bottom, hub] = BOTTOM;
+    let plane = numbers.drive(&name)?.drive.with_set("sleeve.kind=none")?;
+    let ([length, wall], [bottom, hub]) = (CUP, BOTTOM);
+    let wall_mm = wall * pitch_mm;
     let sets = [
         "sleeve.kind=cup".to_owned(),
         "sleeve.bottom=plate".to_owned(),
         format!("sleeve.wall_mm={wall_mm:.4}"),
-        format!("sleeve.bottom_side_mm={:.3}", guess.length * pitch_mm - plane.flexspline.width_mm),
+        format!("sleeve.bottom_side_mm={:.3}", length * pitch_mm - plane.flexspline.width_mm),
         format!("sleeve.bottom_thickness_mm={:.4}", bottom * wall_mm),
         format!("sleeve.hub_radius_mm={:.3}", 0.5 * hub * pitch_mm),
     ];
@@ -252,10 +164,9 @@ fn plane_and_cup(entry: &Catalogue, guess: &Guess) -> Result<[Drive; 2], Box<dyn
 }
 
 /// A drive on balls that are as stiff as they are under a load.
-fn on_balls(drive: &Drive, guess: &Guess, load_n: f64) -> Drive {
+fn on_balls(drive: &Drive, load_n: f64) -> Drive {
     let bore_mm = 2.0 * drive.flexspline.bore_radius_mm();
     let balls = Balls::in_proportion(bore_mm);
-    let balls = Balls { count: guess.balls, diameter_mm: guess.ball * balls.diameter_mm };
     let mut drive = drive.clone();
     drive.generator.bearing_stiffness_n_per_mm3 =
         Some(balls.bedding_n_per_mm3(load_n, bore_mm, drive.flexspline.width_mm));
@@ -263,15 +174,12 @@ fn on_balls(drive: &Drive, guess: &Guess, load_n: f64) -> Drive {
 }
 
 /// A drive loaded on balls: each range on such as it has in its middle.
-fn loaded_on_balls(drive: &Drive, guess: &Guess, ball_n: [f64; 3], loads_n_m: [f64; 3]) -> Result<Loaded, SolveError> {
+fn loaded_on_balls(drive: &Drive, ball_n: [f64; 3], loads_n_m: [f64; 3]) -> Result<Loaded, SolveError> {
     let mut all = Loaded::default();
     for range in 0..3 {
-        let one = loaded(&on_balls(drive, guess, ball_n[range]), &loads_n_m[..=range])?;
+        let one = loaded(&on_balls(drive, ball_n[range]), &loads_n_m[..=range])?;
         all.k[range] = one.k[range];
         all.share_in_contact[range] = one.share_in_contact[range];
-        all.peak_over_mean[range] = one.peak_over_mean[range];
-        all.share_of_face[range] = one.share_of_face[range];
-        all.bearing_tilt_mrad = one.bearing_tilt_mrad;
         if range == 0 {
             all.sum_n = one.sum_n;
         }
@@ -279,124 +187,24 @@ fn loaded_on_balls(drive: &Drive, guess: &Guess, ball_n: [f64; 3], loads_n_m: [f
     Ok(all)
 }
 
-/// The teeth lean with the cup, tapered against it and crowned.
-fn leaning(drive: &Drive, taper_mrad: f64, crowning_um: f64) -> Result<Drive, Box<dyn std::error::Error>> {
-    Ok(drive.with_sets([
-        "flexspline.face=slices",
-        &format!("flexspline.taper_mrad={taper_mrad:.2}"),
-        &format!("flexspline.crowning_um={crowning_um:.2}"),
-    ])?)
-}
-
-/// A line of the cone: stiffness, what is missing of the compliance, and the load along the face.
-fn line(what: &str, entry: &Catalogue, found: &Loaded) {
-    let three = |x: [f64; 3], digits: usize| x.map(|x| format!("{x:.digits$}")).join(" ");
-    let missing = [0, 1, 2].map(|i| 100.0 * (1.0 - entry.k_n_m_per_rad[i] / found.k[i]));
-    println!(
-        "  {what:<44} {:>14}  {:.2}:{:.2}:1  {:>9}  {:>8}  {:>14}  {:>14}  {:>5.0}  {:>5.1}",
-        three(found.k.map(|k| 1e-4 * k), 1),
-        found.k[0] / found.k[2],
-        found.k[1] / found.k[2],
-        three(missing, 0),
-        three(found.share_in_contact.map(|share| 100.0 * share), 0),
-        three(found.peak_over_mean, 1),
-        three(found.share_of_face, 2),
-        0.5 * found.sum_n,
-        found.bearing_tilt_mrad,
-    );
-}
-
-fn heading(entry: &Catalogue) {
-    println!(
-        "size {}: secants K1 K2 K3, 1e4 N·m/rad (catalogue {:?});",
-        entry.size,
-        entry.k_n_m_per_rad.map(|k| 1e-4 * k)
-    );
-    println!("  K1:K2:1; missing, %; flanks in contact, % of the teeth; peak over mean along the face and share of it");
-    println!("  that bears, at T1 T2 rated; load of half the balls without load, N; tilt of what bears, rated, mrad");
-}
-
-/// Everything at once, the teeth leaning with the cup.
-fn cone(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
-    let guess = GUESS;
-    let [_, cup] = plane_and_cup(entry, &guess)?;
-    let (loads, rated) = (entry.loads_n_m, entry.loads_n_m[2]);
-    let ball_n = loaded(&cup, &loads)?.ball_n;
-    let crowning_um = 1e3 * guess.crowning * cup.flexspline.module_mm;
-    let tell = |what: &str, drive: Option<Drive>| -> Result<Loaded, Box<dyn std::error::Error>> {
-        let Some(drive) = drive else {
-            println!("  {what}: binds with {:.0} µm of clearance", -PRELOAD_RANGE_UM[0]);
-            return Ok(Loaded::default());
-        };
-        let found = loaded_on_balls(&drive, &guess, ball_n, loads)?;
-        line(&format!("{what}, {:+.1} µm", drive.flanks.preload_um), entry, &found);
-        Ok(found)
-    };
-    let free = |drive: &Drive, deeper_um: f64| free_of_play(&on_balls(drive, &guess, ball_n[0]), deeper_um);
-    heading(entry);
-    for (name, teeth) in [("involutes", cup.clone()), ("S-shaped", cup.clone().with_s_teeth(0.0))] {
-        let even = tell(&format!("{name}, even"), free(&teeth, 0.0)?)?;
-        tell(&format!("{name}, straight, as drawn"), Some(leaning(&teeth, 0.0, 0.0)?))?;
-        let crowned = leaning(&teeth, 0.0, crowning_um)?;
-        for deeper_um in DEEPER_UM {
-            let Some(drive) = free(&crowned, deeper_um)? else { continue };
-            let [looped, turning] = [loop_arcsec(&drive, rated, 0.0)?, turning_n_m(&drive)?];
-            tell(&format!("{name}, crowned {crowning_um:.0} µm"), Some(drive))?;
-            println!("    flank friction {FRICTION}: loop {looped:.2}″; the generator turns with {turning:.4} N·m");
-        }
-        let taper_mrad = even.bearing_tilt_mrad;
-        let tapered = free(&leaning(&teeth, taper_mrad, crowning_um)?, 0.0)?;
-        tell(&format!("{name}, crowned, tapered {taper_mrad:.1} mrad"), tapered)?;
-    }
-    Ok(())
-}
-
-/// One guess changed at a time.
-fn map(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
-    heading(entry);
-    for (what, guess) in [
-        ("as guessed", GUESS),
-        ("wall 0.7 times", Guess { wall: 0.7 * GUESS.wall, ..GUESS }),
-        ("wall 0.5 times", Guess { wall: 0.5 * GUESS.wall, ..GUESS }),
-        ("cup 0.8 times as long", Guess { length: 0.8 * GUESS.length, ..GUESS }),
-        ("cup 1.6 times as long", Guess { length: 1.6 * GUESS.length, ..GUESS }),
-        ("17 balls", Guess { balls: 17, ..GUESS }),
-        ("balls 0.8 times", Guess { ball: 0.8, ..GUESS }),
-        ("balls 1.2 times", Guess { ball: 1.2, ..GUESS }),
-        ("face 0.7 times", Guess { width: 0.7, ..GUESS }),
-        ("face 0.5 times", Guess { width: 0.5, ..GUESS }),
-        ("crowned 0.06 modules", Guess { crowning: 0.06, ..GUESS }),
-        ("crowned 0.15 modules", Guess { crowning: 0.15, ..GUESS }),
-        ("3 µm deeper", Guess { deeper_um: 3.0, ..GUESS }),
-    ] {
-        let [_, cup] = plane_and_cup(entry, &guess)?;
-        let ball_n =
-            loaded(&cup, &entry.loads_n_m)?.ball_n.map(|n| n * f64::from(GUESS.balls) / f64::from(guess.balls));
-        let crowned = leaning(&cup.clone().with_s_teeth(0.0), 0.0, 1e3 * guess.crowning * cup.flexspline.module_mm)?;
-        let Some(drive) = free_of_play(&on_balls(&crowned, &guess, ball_n[0]), guess.deeper_um)? else { continue };
-        line(what, entry, &loaded_on_balls(&drive, &guess, ball_n, entry.loads_n_m)?);
-    }
-    Ok(())
-}
-
 fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
-    let [plane, cup] = plane_and_cup(entry, &GUESS)?;
+    let [plane, cup] = plane_and_cup(entry)?;
     let pitch_mm = 2.54 * f64::from(entry.size);
     let bore_mm = 2.0 * plane.flexspline.bore_radius_mm();
     let alone = loaded(&plane, &entry.loads_n_m)?;
     let in_cup = loaded(&cup, &entry.loads_n_m)?;
-    let with_balls = loaded_on_balls(&cup, &GUESS, in_cup.ball_n, entry.loads_n_m)?.k;
+    let with_balls = loaded_on_balls(&cup, in_cup.ball_n, entry.loads_n_m)?.k;
     // S-shaped teeth in the same cup, on balls as stiff as they are in the lowest range.
-    let s_shaped = |preload_um: f64, load_n: f64| on_balls(&cup.clone().with_s_teeth(preload_um), &GUESS, load_n);
-    let preloaded = loaded_on_balls(&cup.clone().with_s_teeth(PRELOADS_UM[0]), &GUESS, in_cup.ball_n, entry.loads_n_m)?;
+    let s_shaped = |preload_um: f64, load_n: f64| on_balls(&cup.clone().with_s_teeth(preload_um), load_n);
+    let preloaded = loaded_on_balls(&cup.clone().with_s_teeth(PRELOADS_UM[0]), in_cup.ball_n, entry.loads_n_m)?;
     let (with_s, contacts) = (preloaded.k, preloaded.share_in_contact);
 
     println!(
         "size {}, i = 100: 200 teeth, module {:.4} mm, cup {:.1} x {:.2} mm (guess)",
         entry.size,
         plane.flexspline.module_mm,
-        GUESS.length * pitch_mm,
-        GUESS.wall * pitch_mm
+        CUP[0] * pitch_mm,
+        CUP[1] * pitch_mm
     );
     println!("  {:<46} {:>9} {:>9} {:>9}", "", "K1", "K2", "K3");
     row("catalogue (single units ±30 %)", entry.k_n_m_per_rad.map(|k| 1e-4 * k), "1e4 N·m/rad");
@@ -452,22 +260,14 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn main() -> ExitCode {
-    let mut asked: Vec<String> = std::env::args().skip(1).collect();
-    let work = match asked.first().map(String::as_str) {
-        Some("cone") => cone,
-        Some("map") => map,
-        _ => budget,
-    };
-    if asked.first().is_some_and(|word| ["cone", "map"].contains(&word.as_str())) {
-        asked.remove(0);
-    }
+    let asked: Vec<String> = std::env::args().skip(1).collect();
     let known: Vec<String> = CATALOGUE.iter().map(|entry| entry.size.to_string()).collect();
     if let Some(wrong) = asked.iter().find(|size| !known.contains(size)) {
-        eprintln!("catalogue_budget [cone | map] [SIZE …]: found {wrong}, allowed: {}", known.join(", "));
+        eprintln!("catalogue_budget [SIZE …]: found {wrong}, allowed: {}", known.join(", "));
         return ExitCode::from(2);
     }
     for entry in CATALOGUE.iter().filter(|entry| asked.is_empty() || asked.contains(&entry.size.to_string())) {
-        if let Err(error) = work(entry) {
+        if let Err(error) = budget(entry) {
             eprintln!("size {}: {error}", entry.size);
             return ExitCode::from(1);
         }
