@@ -1,7 +1,7 @@
 //! Catalogue values of a size, for the `[data_sheet]` of a drive that is made like one of them.
 //!
-//! The figures are those of Harmonic Drive's cups and silk hats, which share one table of stiffness (Harmonic Drive LLC,
-//! CSF/CSG catalogue, pages 14 and 49; Harmonic Drive AG, HFUS-2A 1019658, 11/2014; `catalogue.csv` says which is
+//! The figures are those of Harmonic Drive's cups and silk hats, which share one table of stiffness (Harmonic Drive
+//! LLC, CSF/CSG catalogue, pages 14 and 49; Harmonic Drive AG, HFUS-2A 1019658, 11/2014; `catalogue.csv` says which is
 //! whose). They also say that a single unit may be 30 % off the stiffness. It is printed for i = 30, 50, and 80 and
 //! above: between these and below nobody knows, so that no figures of another ratio stand in.
 
@@ -24,8 +24,8 @@ pub fn series(name: &str) -> Option<&'static str> {
     SERIES.into_iter().find(|known| [Some(name.as_str()), name.strip_prefix('L')].contains(&Some(*known)))
 }
 
-/// Catalogue values of a size and ratio. Of a size between two printed ones T1, T2 and K alone, by the cube of the size;
-/// none of a series or ratio that is not at hand, or of a size beyond the printed ones.
+/// Catalogue values of a size and ratio. Of a size between two printed ones T1, T2 and K alone, by the cube of the
+/// size; none of a series or ratio that is not at hand, or of a size beyond the printed ones.
 pub fn sheet(name: &str, size: f64, ratio: u32) -> Option<Stated> {
     let series = series(name)?;
     let rows = of_ratio(ratio);
@@ -81,8 +81,8 @@ struct SizeRow {
 }
 
 impl SizeRow {
-    /// A size between two: what is printed of them, over the cube of the size, goes from one to the other in proportion;
-    /// to three digits.
+    /// A size between two: what is printed of them, over the cube of the size, goes from one to the other in
+    /// proportion; to three digits.
     fn between(below: &SizeRow, above: &SizeRow, size: f64) -> SizeRow {
         let share = (size - below.size) / (above.size - below.size);
         let stiffness = std::array::from_fn(|k| {

@@ -102,12 +102,12 @@ impl Caution {
                 "neither cup nor data sheet: this drive is 5 to 8 times stiffer than cups that are sold".to_owned(),
             )
         } else if ratio < least {
-            let words = "cups that are sold with i = 30 are 3.7 to 6.2 times softer than FEM with cup and balls, and 1.7 \
-                         to 2.7 times softer than that with contact_compliance";
+            let words = "cups that are sold with i = 30 are 3.7 to 6.2 times softer than FEM with cup and balls, and \
+                         1.7 to 2.7 times softer than that with contact_compliance";
             (ratio, least, format!("i = {ratio:.0} is below {least}: {words}"))
         } else if ratio > most {
-            let words = "with contact_compliance K1 is 25 % too stiff at i = 160, and nothing is known beyond; without it \
-                         K1 is 2.6 and K2 and K3 are 1.5 times those of cups that are sold";
+            let words = "with contact_compliance K1 is 25 % too stiff at i = 160, and nothing is known beyond; without \
+                         it K1 is 2.6 and K2 and K3 are 1.5 times those of cups that are sold";
             (ratio, most, format!("i = {ratio:.0} is above {most}: {words}"))
         } else if 2.0 * drive.flexspline.pitch_radius_mm() < LEAST_BORNE_OUT_MM {
             let pitch_mm = 2.0 * drive.flexspline.pitch_radius_mm();
@@ -170,8 +170,8 @@ impl LookedAt {
         if place == ROOT_FILLET {
             say(place, stress, 1.0, YIELD_MPA, |stress| {
                 format!(
-                    "a root fillet has {stress:.0} MPa on this mesh, above {YIELD_MPA} MPa; finer meshes have ended at a \
-                     third of such a stress: simulate --stress judges it over three"
+                    "a root fillet has {stress:.0} MPa on this mesh, above {YIELD_MPA} MPa; finer meshes have ended at \
+                     a third of such a stress: simulate --stress judges it over three"
                 )
             });
         } else {
@@ -293,7 +293,7 @@ mod tests {
         assert!(!none(LookedAt { root_fillet_mpa: Some(3205.0), ..sound }));
     }
 
-    /// Where catalogues bear the stiffness out nothing is said; elsewhere what it is off by, of a sheet's drive nothing.
+    /// Where catalogues bear the stiffness out nothing is said; elsewhere what it is off by.
     #[test]
     fn stiffness_that_no_catalogue_bears_out_is_said() {
         let few = |teeth: u32, pitch_mm: f64| {

@@ -102,14 +102,14 @@ pub(crate) fn either_way_rad(drive: &Drive, table: &Table<'_>, torque_n_m: f64) 
 pub struct WindUpPart {
     /// Which.
     pub part: &'static str,
-    /// The wind-up that it adds, arcsec, in the sense of the load.
+    /// The wind-up that it adds, arcsec; positive: the output turns forward.
     pub arcsec: f64,
     /// Of all of it.
     pub percent: f64,
 }
 
-/// The wind-up of a drive at rest from first contact to a load, part by part: teeth and rim alone; what sleeve and balls
-/// add, in this order; and the empirical part ([`Drive::contact_wind_up_rad`]).
+/// The wind-up of a drive at rest from first contact to a load, part by part: teeth and rim alone; what sleeve and
+/// balls add, in this order; and the empirical part ([`Drive::contact_wind_up_rad`]).
 ///
 /// # Errors
 /// No equilibrium, of the drive or of one without a part.

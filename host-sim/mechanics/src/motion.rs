@@ -123,7 +123,7 @@ impl<'p> Motion<'p> {
         }
     }
 
-    /// Angle of the output under its load, rad: that of the circular spline, and the wind-up that is no part of the FEM.
+    /// Angle of the output under its load, rad: that of the circular spline, and the wind-up that is not of the FEM.
     pub fn output_rad(&self) -> f64 {
         self.state.output_rad + self.problem.drive.contact_wind_up_rad(self.state.torque_n_m)
     }

@@ -1,5 +1,5 @@
-//! A drive made of a few numbers, before it is written: S-shaped teeth, cup and balls by guesses, under which generators
-//! its teeth clear, and the formulas above its fields.
+//! A drive made of a few numbers, before it is written: S-shaped teeth, guesses of cup and balls, under which
+//! generators its teeth clear, and the formulas above its fields.
 
 use std::collections::BTreeMap;
 
@@ -33,9 +33,9 @@ const CONTACT_TEETH: std::ops::RangeInclusive<u32> = 100..=320;
 const GUESSED: &str = "a guess in proportion to the pitch diameter: no catalogue prints it";
 /// Above `output.contact_compliance`.
 const CONTACT: &str = "what all sizes of a catalogue have beside teeth, cup and balls: a regularity with a form that \
-                       Hertz gives, not a derivation; exponent and ratio power were chosen; 5.8 fitted on sizes 17 to 40, \
-                       i = 50 and 80, unseen 45 to 90 within 14 %; at i = 160 K1 is 25 % too stiff, size 14 is 20 to 40 % \
-                       off";
+                       Hertz gives, not a derivation; exponent and ratio power were chosen; 5.8 fitted on sizes 17 to \
+                       40, i = 50 and 80, unseen 45 to 90 within 14 %; at i = 160 K1 is 25 % too stiff, size 14 is 20 \
+                       to 40 % off";
 /// Tip roundings of S-shaped teeth, modules, as of S-95.
 const S_TIP_ROUNDING: f64 = 0.1;
 
