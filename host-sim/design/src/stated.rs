@@ -466,7 +466,7 @@ impl SheetBeside {
         let each = off().zip(ratios()).map(|(row, ratio)| format!("{} {ratio:.2}", row.in_words().0));
         let percent = self.stated.unit_scatter_percent.unwrap_or(0.0);
         let way_out = if ratios().all(|ratio| ratio > 1.0) {
-            "; `new` makes cup, balls and contact_compliance, and tables --complete-from-data-sheet adds the rest"
+            "; tables --complete-from-data-sheet adds what is missing"
         } else {
             ""
         };
