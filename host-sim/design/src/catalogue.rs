@@ -154,7 +154,7 @@ mod tests {
         assert!(sizes_in_words().contains("i = 30 (sizes 14 to 32), 50 (11 to 90) and 80 to 160 (11 to 90)"));
     }
 
-    /// Every printed size from its neighbours: within 5 % from size 20 on (measured: 4.4 %).
+    /// Every printed size from its neighbours: within 9 % from size 20 on (measured: 8.4 %, K2 of CSF-32-50).
     #[test]
     fn a_size_between_two_follows_from_the_cube() {
         let mut worst = 0.0_f64;
@@ -167,7 +167,7 @@ mod tests {
             }
         }
         println!("off by {worst:.4} at most");
-        assert!((0.001..0.05).contains(&worst), "{worst}");
+        assert!((0.08..0.09).contains(&worst), "{worst}");
         let between = sheet("CSG", 28.0, 100).unwrap();
         assert!(between.rated_torque_n_m.is_none() && between.source.unwrap().contains("CSG-25-100 and CSG-32-100"));
     }
@@ -176,11 +176,12 @@ mod tests {
     #[test]
     fn every_line_makes_a_sheet_that_a_file_takes() {
         for row in [30, 50, 80, 100, 120, 160].into_iter().flat_map(of_ratio) {
-            let (size, ratio) = (row.size, row.ratio);
-            let stated = sheet("CSG", size, ratio).unwrap();
-            let read = Stated::of_file("d.toml", &stated.to_toml()).unwrap().unwrap();
-            assert_eq!(read, stated, "{size} {ratio}");
-            assert!(stated.k1_n_m_per_rad < stated.k2_n_m_per_rad && stated.k2_n_m_per_rad < stated.k3_n_m_per_rad);
+            for series in SERIES {
+                let stated = sheet(series, row.size, row.ratio).unwrap();
+                let read = Stated::of_file("d.toml", &stated.to_toml()).unwrap().unwrap();
+                assert_eq!(read, stated, "{series} {row:?}");
+                assert!(stated.k1_n_m_per_rad < stated.k2_n_m_per_rad && stated.k2_n_m_per_rad < stated.k3_n_m_per_rad);
+            }
         }
     }
 }
