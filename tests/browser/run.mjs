@@ -14,6 +14,9 @@ const shots = path.join(folder, "screenshots");
 mkdirSync(shots, { recursive: true });
 
 const MOST_BYTES = 1_500_000;
+/** Pixels of a page as it opens on a desktop, and from its top to where its picture begins. */
+const MOST_HEIGHT = 5000;
+const FIRST_SCREEN = 900;
 /** The page opens in well below a second on an idle machine; the tests share theirs. */
 const MOST_READY_MS = 8000;
 /** 30 and more on an idle machine, by software. */
@@ -76,10 +79,18 @@ async function open(file, { width = 1440, dark = false, hash = "", script = true
   const begun = Date.now();
   await page.goto(pathToFileURL(path.join(folder, file)).href + hash);
   if (script && ready) await page.waitForFunction(() => document.documentElement.dataset.ready);
+  const readyMs = Date.now() - begun;
+  // What a reader sees before anything is unfolded; then everything.
+  const first = script && {
+    height: await page.evaluate(() => document.documentElement.scrollHeight),
+    picture: await page.evaluate(() => document.querySelector(".drawing")?.getBoundingClientRect().top ?? 0),
+  };
+  if (script) await page.evaluate(() => document.querySelectorAll("section details").forEach((e) => (e.open = true)));
   return {
     page,
     noise,
-    readyMs: Date.now() - begun,
+    first,
+    readyMs,
     close: () => context.close(),
   };
 }
@@ -216,12 +227,16 @@ for (const file of [
     [390, true],
   ]) {
     const name = `${title} at ${width} px, ${dark ? "dark" : "light"}`;
-    const { page, noise, readyMs, close } = await open(file, { width, dark });
+    const { page, noise, first, readyMs, close } = await open(file, { width, dark });
     await check(`${name}: opens`, () => {
       assert(readyMs <= MOST_READY_MS, `${readyMs} ms until all is drawn, at most ${MOST_READY_MS}`);
       return `${readyMs} ms until all is drawn`;
     });
-    await page.locator("#detail").selectOption("full");
+    await check(`${name}: the answer, figures and picture come first`, () => {
+      const { height, picture } = first;
+      assert(width < 1000 || (height <= MOST_HEIGHT && picture < FIRST_SCREEN), `${height} px, picture at ${picture}`);
+      return `${height} px, picture at ${Math.round(picture)}`;
+    });
     await settled(page);
     await check(`${name}: nothing wider than the page`, async () => {
       const [wide, has] = await page.evaluate(() => [

@@ -30,8 +30,6 @@ pub const FRAMES: usize = 8;
 const DISPLACEMENT_STEP_MM: f64 = 1e-4;
 /// Flanks closer than this (mm) may touch between the points that the search looks at.
 const NEAR_MM: f64 = 0.01;
-/// Share of all nodal stresses that the colour scale spans; the few above it are at corners that bear.
-const COLOUR_SHARE: f64 = 0.9995;
 
 /// One wheel: its first sector, and what happens to the sector in the course of a wave. Its arrays are packed apart.
 #[derive(Debug, Clone, Serialize)]
@@ -88,9 +86,7 @@ pub struct Animation {
     pub error_arcsec: Vec<f64>,
     /// The rows of the run, in the same order.
     pub rows: Vec<Row>,
-    /// End of the colour scale, MPa.
-    pub colour_end_mpa: f64,
-    /// Largest stress anywhere, MPa.
+    /// Largest stress anywhere, MPa: the end of the colour scale.
     pub peak_mpa: f64,
     /// The flexspline in three dimensions, of a drive whose sleeve is shells.
     pub sleeve: Option<SleeveView>,
@@ -322,7 +318,6 @@ impl Animation {
             bore_radius_mm: problem.flexspline.base_radius,
             error_arcsec: vec![0.0; FRAMES],
             rows: Vec::new(),
-            colour_end_mpa: 0.0,
             peak_mpa: 0.0,
             sleeve: None,
         }
@@ -359,20 +354,10 @@ impl Animation {
 
     fn finish(self, rows: Vec<Row>) -> Animation {
         let wheels = [&self.flexspline, &self.circular_spline];
-        let mut all: Vec<f64> = wheels.iter().flat_map(|wheel| wheel.von_mises_mpa.iter().copied()).collect();
-        all.sort_by(f64::total_cmp);
-        let last = all.len() - 1;
-        let (peak_mpa, colour_end_mpa) = (all[last], round_up(all[(last as f64 * COLOUR_SHARE) as usize]));
+        let peak_mpa = wheels.iter().flat_map(|wheel| wheel.von_mises_mpa.iter().copied()).fold(0.0, f64::max);
         let Row { torque_n_m, temperature_c, .. } = rows[0];
-        Animation { torque_n_m, temperature_c, rows, peak_mpa, colour_end_mpa, ..self }
+        Animation { torque_n_m, temperature_c, rows, peak_mpa, ..self }
     }
-}
-
-/// The next 1, 1.5, 2, 2.5, 3, 4, 5, 6 or 8 times a power of ten.
-fn round_up(x: f64) -> f64 {
-    let ten = 10_f64.powf(x.max(1e-9).log10().floor());
-    let steps = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-    steps.into_iter().map(|step| step * ten).find(|step| *step >= x * (1.0 - 1e-12)).unwrap_or(10.0 * ten)
 }
 
 impl WheelMotion {
@@ -393,20 +378,19 @@ impl WheelMotion {
     }
 
     /// Its arrays for a page, named `<prefix>.nodes` and so on.
-    fn pack(&self, prefix: &str, colour_end_mpa: f64) -> Vec<Packed> {
+    fn pack(&self, prefix: &str, peak_mpa: f64) -> Vec<Packed> {
         let name = |part: &str| format!("{prefix}.{part}");
         let nodes = self.nodes.len();
         let elements = self.elements.iter().flatten().map(|(node, sector)| (node + sector * nodes) as f64);
         let outline: Vec<f64> =
             self.outline().iter().flatten().map(|(node, sector)| (node + sector * nodes) as f64).collect();
         // Beyond the end of the colour scale all colours are alike.
-        let stress: Vec<f64> = self.von_mises_mpa.iter().map(|mpa| mpa.min(colour_end_mpa)).collect();
         vec![
             Packed::floats(name("nodes"), &[nodes, 2], self.nodes.iter().flatten().copied()),
             Packed::steps(name("elements"), &[self.elements.len(), 8], 1.0, &elements.collect::<Vec<_>>()),
             Packed::steps(name("outline"), &[self.outline().len(), 3], 1.0, &outline),
             Packed::steps(name("displacement"), &[nodes, 2, self.samples], DISPLACEMENT_STEP_MM, &self.displacement_mm),
-            Packed::steps(name("stress"), &[nodes, self.samples], colour_end_mpa / 255.0, &stress),
+            Packed::steps(name("stress"), &[nodes, self.samples], peak_mpa / 255.0, &self.von_mises_mpa),
         ]
     }
 }
@@ -415,8 +399,8 @@ impl Animation {
     /// Its arrays for a page; names begin with the name of the generator.
     pub(crate) fn pack(&self) -> Vec<Packed> {
         let kind = self.kind;
-        let mut packed = self.flexspline.pack(&format!("{kind}.flexspline"), self.colour_end_mpa);
-        packed.extend(self.circular_spline.pack(&format!("{kind}.circular-spline"), self.colour_end_mpa));
+        let mut packed = self.flexspline.pack(&format!("{kind}.flexspline"), self.peak_mpa);
+        packed.extend(self.circular_spline.pack(&format!("{kind}.circular-spline"), self.peak_mpa));
         let points = self.generator.iter().map(Vec::len).next().unwrap_or(0);
         let outline = self.generator.iter().flatten().flatten().copied();
         packed.push(Packed::floats(format!("{kind}.generator"), &[self.generator.len(), points, 2], outline));
@@ -491,7 +475,7 @@ mod tests {
         assert!(differ(&passed.flexspline.displacement_mm, &animation.flexspline.displacement_mm) < 1e-5);
         assert!(differ(&passed.error_arcsec, &animation.error_arcsec) < 0.02);
         assert_eq!(passed.torque_n_m, torque);
-        assert!(animation.peak_mpa > 100.0 && animation.colour_end_mpa <= animation.peak_mpa * 1.5);
+        assert!(animation.peak_mpa > 100.0);
     }
 
     /// The arrows hold the load: their moments about the axis are the torque less the drag, and the generator carries
@@ -551,14 +535,6 @@ mod tests {
         let drive = Drive::hhd_95().with_set("as_built.circular_spline_eccentricity_um=10").unwrap();
         let error = animate(&drive, GeneratorKind::Cam, 0.0, coarse(), &mut || ControlFlow::Continue(())).unwrap_err();
         assert!(error.to_string().contains("as_built.circular_spline_eccentricity_um"), "{error}");
-    }
-
-    #[test]
-    fn colour_scales_end_on_round_numbers() {
-        let cases = [(0.9, 1.0), (101.0, 150.0), (199.0, 200.0), (200.0, 200.0), (450.0, 500.0), (901.0, 1000.0)];
-        for (x, expected) in cases {
-            assert!((round_up(x) - expected).abs() < 1e-9, "{x}: {}", round_up(x));
-        }
     }
 
     /// Four generators on the standard mesh have to fit a page of 1.5 MB; the coarse mesh has half its nodes.

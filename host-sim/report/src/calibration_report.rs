@@ -3,8 +3,7 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
-    RichText, Status,
+    ChartAxis, ChartSeries, Choice, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText, Status,
 };
 use flexspline_identify::calibrate::{Calibrated, Calibration, PartSays};
 
@@ -74,7 +73,7 @@ fn left(made: &Calibrated) -> PageSection {
         Lines::of(vec![series("measured", 0, 1), series("left by the table", 1, 2)]).for_every_choice(),
     );
     let table = PageBlock::table("What is left, root mean square", &["Of", "Error"], rows);
-    PageSection::new("left", "What is left", Detail::Summary, vec![table, figure])
+    PageSection::new("left", "What is left", vec![table, figure])
 }
 
 fn parts(c: &Calibration) -> PageSection {
@@ -92,7 +91,7 @@ fn parts(c: &Calibration) -> PageSection {
                    size half of peak to peak";
     let header = ["Part", "Verdict", "Gain", "Size", "Why"];
     let table = PageBlock::table(caption, &header, c.parts.iter().map(row).collect());
-    PageSection::new("parts", "Its parts", Detail::Summary, vec![table])
+    PageSection::new("parts", "Its parts", vec![table])
 }
 
 fn reading() -> PageSection {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::animation::{Animation, FRAMES};
 use super::page::{
-    ChartAxis, ChartSeries, Detail, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection, RichText,
+    ChartAxis, ChartSeries, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection, RichText,
     significant,
 };
 use flexspline_design::cautions::Caution;
@@ -173,5 +173,5 @@ pub(super) fn sheet_section(sheets: Vec<(String, SheetBeside)>) -> Option<PageSe
         let why = sheet.why.as_ref().map(|why| PageBlock::paragraph(format!("Not all of it was computed: {why}.")));
         blocks.extend([Some(table), loads, why].into_iter().flatten().map(|block| block.of_choice(id.clone())));
     }
-    Some(PageSection::new("data-sheet", "The data sheet and the model", Detail::Summary, blocks))
+    Some(PageSection::new("data-sheet", "The data sheet and the model", blocks))
 }

@@ -11,8 +11,8 @@ use super::drive_figures::{
     sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
-    ChartAxis, ChartSeries, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
-    RichText, SIGNS, Status, made_of_drive, significant,
+    ChartAxis, ChartSeries, Choice, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
+    SIGNS, Status, made_of_drive, significant,
 };
 use flexspline_base::robust::{least_and_most, rms};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -475,7 +475,7 @@ fn stress_section(known: &[DriveKnown<'_>]) -> Option<PageSection> {
     };
     let blocks: Vec<PageBlock> = known.iter().filter_map(block).collect();
     let title = "Stress, over three meshes";
-    (!blocks.is_empty()).then(|| PageSection::new("stress-by-place", title, Detail::Summary, blocks))
+    (!blocks.is_empty()).then(|| PageSection::new("stress-by-place", title, blocks))
 }
 
 fn comparison(known: &[DriveKnown<'_>], validated: bool) -> PageSection {
@@ -503,7 +503,7 @@ fn comparison(known: &[DriveKnown<'_>], validated: bool) -> PageSection {
             known.first().map_or(20.0, |k| k.temperature)
         )
     };
-    PageSection::new("comparison", "At a glance", Detail::Summary, vec![table, PageBlock::paragraph(words)])
+    PageSection::new("comparison", "At a glance", vec![table, PageBlock::paragraph(words)])
 }
 
 /// The load, stretched about the drag, where the loaded flank changes.
@@ -542,7 +542,7 @@ fn motion_section(known: &[DriveKnown<'_>]) -> PageSection {
     if known.iter().any(|k| k.subject.animation.as_ref().is_ok_and(|a| a.sleeve.is_some())) {
         blocks.push(PageBlock::Figure(sleeve_figure()));
     }
-    PageSection::new("motion", "The drive at work", Detail::Summary, blocks)
+    PageSection::new("motion", "The drive at work", blocks)
 }
 
 fn validation_section(known: &[DriveKnown<'_>]) -> PageSection {
@@ -586,7 +586,7 @@ fn validation_section(known: &[DriveKnown<'_>]) -> PageSection {
         [ChartAxis::new("Generator travel", PageQuantity::Degree), ChartAxis::new("Output error", PageQuantity::Error)],
         charts(known, |k| k.subject.validation.map(reversal)),
     ));
-    PageSection::new("validation", "Against fresh FEM", Detail::Summary, blocks)
+    PageSection::new("validation", "Against fresh FEM", blocks)
 }
 
 fn table_section(known: &[DriveKnown<'_>]) -> PageSection {
@@ -619,13 +619,13 @@ fn table_section(known: &[DriveKnown<'_>]) -> PageSection {
         let caption = format!("The {} table", k.subject.kind.in_words());
         blocks.push(PageBlock::table(caption, &["Property", "Value"], rows).of_choice(k.id()));
     }
-    PageSection::new("table", "The table", Detail::Engineering, blocks)
+    PageSection::folded("table", "The table", blocks)
 }
 
 fn load_section(known: &[DriveKnown<'_>]) -> PageSection {
     let of = |lines: fn(&Animation) -> Lines| charts(known, |k| k.subject.animation.as_ref().ok().map(lines));
     let figures = [stress_figure(of(stress_lines)), sharing_figure(of(sharing_lines))];
-    PageSection::new("load", "Load and stress", Detail::Engineering, figures.into())
+    PageSection::folded("load", "Load and stress", figures.into())
 }
 
 fn reading_section() -> PageSection {

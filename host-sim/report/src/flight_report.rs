@@ -5,8 +5,8 @@ use flexspline_motion::loops::OpenLoop;
 use serde_json::{Map, json};
 
 use super::page::{
-    ChartAxis, ChartSeries, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
-    RichText, Status, Upright,
+    ChartAxis, ChartSeries, Choice, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
+    Status, Upright,
 };
 use flexspline_fly::fly::{ByController, Flown, LEAST_PHASE_MARGIN_DEG, Results, spectrum};
 
@@ -100,7 +100,7 @@ fn tracking(flight: &Flight, results: &Results) -> PageSection {
         ChartAxis::new("Torque", PageQuantity::Torque),
         2,
     );
-    PageSection::new("tracking", "Tracking", Detail::Summary, vec![table, error, mesh])
+    PageSection::new("tracking", "Tracking", vec![table, error, mesh])
 }
 
 fn over_frequency() -> ChartAxis {
@@ -117,7 +117,7 @@ fn details(flown: &Flown, flight: &Flight, results: &Results) -> PageSection {
     );
     let stable = if results.stable { "stable" } else { "not stable" };
     let table = PageBlock::figures(format!("Loops and limits; {stable} after a knock"), &results.figures());
-    PageSection::new("loops", "Spectrum, loops and limits", Detail::Summary, vec![spectrum, table])
+    PageSection::new("loops", "Spectrum, loops and limits", vec![spectrum, table])
 }
 
 /// Sizes of the open loop that the pictures show. A guess: what is far from 1 says nothing about margins.
@@ -158,7 +158,7 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> PageSection {
         OpenLoop::phase_deg,
         vec![limit("−180°".to_owned(), -180.0), sound],
     );
-    PageSection::new("servo", "The servo and its margins", Detail::Summary, vec![gain, phase])
+    PageSection::new("servo", "The servo and its margins", vec![gain, phase])
 }
 
 fn reading() -> PageSection {

@@ -5,8 +5,8 @@
 //!   also stands in the page's JSON block and decides the command's exit code.
 //! - It may speak of several *choices* (the four generators): a selector shows one at a time. Text and tables marked
 //!   with a choice, and every figure, follow it. A page of one thing has one choice and no selector.
-//! - [`PageSection`]s hold text, tables and [`Figure`]s, at one of three levels of [`Detail`]. Figures are numbered in
-//!   their order.
+//! - [`PageSection`]s hold text, tables and [`Figure`]s, numbered in their order: first one row of figures and the
+//!   picture, then what to do next; all else is folded.
 //! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as
 //!   [`RichText::error`] in text, and as [`PageQuantity::Error`] on an axis.
 //! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`ChartAxis::linked`]
@@ -199,28 +199,6 @@ impl Headline {
     }
 }
 
-/// How much a reader wants to know.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Detail {
-    /// Always open.
-    Summary,
-    /// For those who work with the drive.
-    Engineering,
-    /// Everything.
-    Full,
-}
-
-impl Detail {
-    /// As the page's script knows it.
-    fn name(self) -> &'static str {
-        match self {
-            Detail::Summary => "summary",
-            Detail::Engineering => "engineering",
-            Detail::Full => "full",
-        }
-    }
-}
-
 /// A part of the page under a title.
 #[derive(Debug, Clone)]
 pub struct PageSection {
@@ -228,8 +206,8 @@ pub struct PageSection {
     pub id: String,
     /// Title.
     pub title: String,
-    /// From which level of detail on it is open.
-    pub detail: Detail,
+    /// Whether the reader opens it.
+    pub folded: bool,
     /// Its text, tables and figures.
     pub blocks: Vec<PageBlock>,
 }
@@ -280,20 +258,21 @@ impl PageBlock {
 
     /// The figures of a result, the list that the terminal prints, whatever is chosen.
     pub fn figures(caption: impl Into<String>, figures: &[NamedFigure]) -> PageBlock {
-        let row = |NamedFigure { name, value, unit, caveat, what, .. }: &NamedFigure| {
-            let number = match *unit {
-                "arcsec" => RichText::arcsec(*value, 4),
-                "" => RichText::new(significant(*value, 3)),
-                unit => {
-                    format!("{}\u{a0}{}", significant(*value, 4), unit.replace("N.m", "N·m").replace("deg", "°")).into()
-                }
-            };
+        let row = |figure: &NamedFigure| {
+            let NamedFigure { caveat, what, .. } = figure;
             let semicolon = if what.is_empty() || caveat.is_empty() { "" } else { "; " };
-            let mut name = name.clone();
-            name[..1].make_ascii_uppercase();
-            vec![name.into(), number, format!("{what}{semicolon}{caveat}").into()]
+            let [name, number] = on_a_page(figure);
+            vec![name, number, format!("{what}{semicolon}{caveat}").into()]
         };
         PageBlock::table(caption, &["Figure", "Value", "What it is"], figures.iter().map(row).collect())
+    }
+
+    /// Of the figures of a result, those of these names in one row.
+    pub fn row(caption: impl Into<String>, figures: &[NamedFigure], names: &[&str]) -> PageBlock {
+        let named = names.iter().filter_map(|name| figures.iter().find(|figure| figure.name == *name));
+        let (header, row): (Vec<String>, Vec<RichText>) =
+            named.map(on_a_page).map(|[name, number]| (name.to_string(), number)).unzip();
+        PageBlock::Table { choice: None, table: PageTable { caption: caption.into(), header, rows: vec![row] } }
     }
 
     /// A figure of curves and points, a chart to each choice. Its title is also its alternative text.
@@ -317,6 +296,18 @@ impl PageBlock {
     }
 }
 
+/// Name and value of a figure of a result, with its unit.
+fn on_a_page(NamedFigure { name, value, unit, .. }: &NamedFigure) -> [RichText; 2] {
+    let number = match *unit {
+        "arcsec" => RichText::arcsec(*value, 4),
+        "" => RichText::new(significant(*value, 3)),
+        unit => format!("{}\u{a0}{}", significant(*value, 4), unit.replace("N.m", "N·m").replace("deg", "°")).into(),
+    };
+    let mut name = name.clone();
+    name[..1].make_ascii_uppercase();
+    [name.into(), number]
+}
+
 impl Figure {
     /// A figure whose title is also its alternative text.
     pub fn of(
@@ -331,9 +322,14 @@ impl Figure {
 }
 
 impl PageSection {
-    /// A section.
-    pub fn new(id: &str, title: impl Into<String>, detail: Detail, blocks: Vec<PageBlock>) -> PageSection {
-        PageSection { id: id.into(), title: title.into(), detail, blocks }
+    /// A section that is open from the first.
+    pub fn new(id: &str, title: impl Into<String>, blocks: Vec<PageBlock>) -> PageSection {
+        PageSection { id: id.into(), title: title.into(), folded: false, blocks }
+    }
+
+    /// A section that the reader opens.
+    pub fn folded(id: &str, title: impl Into<String>, blocks: Vec<PageBlock>) -> PageSection {
+        PageSection { folded: true, ..PageSection::new(id, title, blocks) }
     }
 
     /// How to read the page: the last section, folded.
@@ -342,7 +338,7 @@ impl PageSection {
             "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table and as \
              CSV, in the unit that is selected: the points that are drawn.",
         ));
-        PageSection::new("reading", "How to read this page", Detail::Full, blocks)
+        PageSection::folded("reading", "How to read this page", blocks)
     }
 }
 
@@ -790,7 +786,7 @@ mod tests {
             sections: vec![PageSection {
                 id: "section".into(),
                 title: HOSTILE.into(),
-                detail: Detail::Summary,
+                folded: false,
                 blocks: vec![PageBlock::Figure(figure)],
             }],
             animations: Vec::new(),

@@ -12,8 +12,8 @@ use super::drive_figures::{
     sharing_axes, sharing_figure, sharing_lines, sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
-    ChartAxis, ChartSeries, Choice, Detail, FieldMap, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock,
-    PageQuantity, PageSection, RichText, SIGNS, Status, made_of_drive,
+    ChartAxis, ChartSeries, Choice, FieldMap, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock, PageQuantity,
+    PageSection, RichText, SIGNS, Status, made_of_drive,
 };
 use flexspline_design::simulate::{Observation, Row, Simulation, Summary, TipContact};
 use flexspline_design::stated;
@@ -29,6 +29,16 @@ const ROWS_OF_A_MAP: usize = 4;
 /// Rows of one stretch of the torque from which it is drawn as a curve: fewer are a load that is changed, not a test of
 /// torsion.
 const ROWS_OF_A_LOOP: usize = 3;
+/// Figures that stand above the picture, where the path has them.
+const FIRST_FIGURES: [&str; 7] = [
+    "kinematic error, peak to peak",
+    "backlash",
+    "lost motion at the reversal",
+    "wind-up from mid-backlash",
+    "wind-up, elastic part",
+    "largest flank pressure",
+    "mean torque of the generator",
+];
 /// Teeth that a map shows beyond the last that bears, so that its end is seen.
 const TEETH_BESIDE: usize = 2;
 
@@ -88,12 +98,12 @@ pub fn simulation_report(
     let Simulation { rows, summary } = simulation;
     let motion = seen.passing.finish()?;
     let known = RunKnown { drive, kind, summary, rows, teeth: &seen.teeth, motion: motion.as_ref() };
-    let mut sections = vec![known.found()];
-    sections
-        .extend(summary.data_sheet.as_ref().and_then(|sheet| sheet_section(vec![(kind.to_string(), sheet.clone())])));
-    sections.extend([known.in_motion(), known.along_path()].into_iter().flatten());
-    sections.push(known.load());
-    sections.push(known.reading());
+    let sheet = summary.data_sheet.as_ref().and_then(|sheet| sheet_section(vec![(kind.to_string(), sheet.clone())]));
+    let mut sections: Vec<PageSection> = [known.in_motion(), known.along_path(), sheet].into_iter().flatten().collect();
+    if let Some(first) = sections.first_mut() {
+        first.blocks.insert(0, PageBlock::row(known.caption(), &summary.figures(), &FIRST_FIGURES));
+    }
+    sections.extend([known.found(), known.load(), known.reading()]);
     let remarks: Vec<String> = summary.cautions.iter().map(|caution| format!("{}.", caution_words(caution))).collect();
     Ok(Page {
         title: format!("{} along a path", drive.name),
@@ -151,17 +161,21 @@ impl RunKnown<'_> {
         Headline::new(RichText::filled(&(words + "."), &found), RichText::arcsec(number, 3), number_is)
     }
 
-    /// The figures of the summary.
-    fn found(&self) -> PageSection {
+    /// Drive, generator, loads.
+    fn caption(&self) -> String {
         let load = match (self.summary.torque_n_m, self.summary.temperature_c) {
             (Some(torque), Some(celsius)) => format!("{} N·m, {} °C", plain(torque), plain(celsius)),
             (None, Some(celsius)) => format!("loads of the path, {} °C", plain(celsius)),
             (Some(torque), None) => format!("{} N·m, temperatures of the path", plain(torque)),
             (None, None) => "loads and temperatures of the path".to_owned(),
         };
-        let caption = format!("{} with {} generator: {load}", self.drive.name, self.kind.in_words());
-        let table = PageBlock::figures(caption, &self.summary.figures());
-        PageSection::new("found", "What was found", Detail::Summary, vec![table])
+        format!("{} with {} generator: {load}", self.drive.name, self.kind.in_words())
+    }
+
+    /// The figures of the summary.
+    fn found(&self) -> PageSection {
+        let table = PageBlock::figures(self.caption(), &self.summary.figures());
+        PageSection::folded("found", "All figures", vec![table])
     }
 
     /// The drive in motion, where the path passes a whole pitch.
@@ -188,7 +202,7 @@ impl RunKnown<'_> {
             sharing_figure(self.chart(sharing_lines(motion))),
         ];
         blocks.extend(motion.sleeve.as_ref().map(|_| PageBlock::Figure(sleeve_figure())));
-        Some(PageSection::new("motion", "The drive at work", Detail::Summary, blocks))
+        Some(PageSection::new("motion", "The drive at work", blocks))
     }
 
     /// A chart of the one choice.
@@ -238,7 +252,7 @@ impl RunKnown<'_> {
                 of_stretches(self.rows, &loads, |row| row.torque_n_m, error, words),
             ));
         }
-        (!blocks.is_empty()).then(|| PageSection::new("path", "Along the path", Detail::Summary, blocks))
+        (!blocks.is_empty()).then(|| PageSection::new("path", "Along the path", blocks))
     }
 
     /// How the teeth share the load along the path, stress, pressures, contacts, the torque of the generator.
@@ -276,7 +290,7 @@ impl RunKnown<'_> {
                 &[("generator", |row| row.generator_torque_n_m)],
             ));
         }
-        PageSection::new("load", "Load and stress", Detail::Engineering, blocks)
+        PageSection::folded("load", "Load and stress", blocks)
     }
 
     /// The axis of figures along the path, and the places of the rows, ascending: generator or torque where that goes

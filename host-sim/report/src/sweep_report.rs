@@ -3,8 +3,8 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
-    PageTable, RichText, Status, significant,
+    ChartAxis, ChartSeries, Choice, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, PageTable,
+    RichText, Status, significant,
 };
 use flexspline_design::sweep::{
     FigureSpread, Judge, OfGenerator, RankCorrelation, ReducedSweep, Sense, VariantPlan, VariantRow,
@@ -40,27 +40,29 @@ pub struct SweepSources<'a> {
 /// The page.
 pub fn page(of: &SweepSources<'_>) -> Page {
     let SweepSources { plan, sweep, .. } = of;
-    let tables = [
-        ("best", "The Pareto front", Detail::Summary, tables(of, |one| front(of, one))),
-        ("matters", "What matters", Detail::Summary, tables(of, ranks)),
-        ("figures", "Figure by figure", Detail::Engineering, tables(of, figures)),
+    let fronts = sweep.rows.iter().any(|row| row.is_front).then(|| front(of));
+    let mut sections = vec![
+        trade(of),
+        PageSection::new("best", "The Pareto front", fronts.into_iter().collect()),
+        PageSection::folded("matters", "What matters", tables(of, ranks)),
+        PageSection::folded("figures", "Figure by figure", tables(of, figures)),
     ];
-    let mut sections = vec![trade(of)];
-    for (id, title, detail, blocks) in tables {
-        if !blocks.is_empty() {
-            sections.push(PageSection::new(id, title, detail, blocks));
-        }
-    }
+    sections.retain(|section| !section.blocks.is_empty());
     sections.push(PageSection::reading(vec![PageBlock::paragraph(READING)]));
     let choice = |one: &OfGenerator| Choice { id: one.generator.to_string(), name: one.generator.to_string() };
+    let (choices, headlines) = if plan.is_of_tolerances() {
+        sweep.generators.iter().map(|one| (choice(one), drawn(of, one))).unzip()
+    } else {
+        (vec![Choice { id: "all".to_owned(), name: "all generators".to_owned() }], vec![best(of)])
+    };
     Page {
         title: format!("Sweep of {}", sweep.drive),
         command_name: "sweep",
         status: if of.remarks.is_empty() { Status::Good } else { Status::Remark },
         remarks: of.remarks.iter().map(|remark| format!("{remark}.")).collect(),
-        choices: sweep.generators.iter().map(choice).collect(),
+        choices,
         choice_is: "Generator",
-        headlines: sweep.generators.iter().map(|one| headline(of, one)).collect(),
+        headlines,
         sections,
         provenance: vec![
             ("command".to_owned(), of.command.to_owned()),
@@ -94,51 +96,18 @@ fn value(name: &str, value: f64) -> RichText {
     }
 }
 
-/// Rows of a generator.
-fn rows<'a>(of: &'a SweepSources<'_>, one: &OfGenerator) -> impl Iterator<Item = &'a VariantRow> {
-    let kind = one.generator;
-    of.sweep.rows.iter().filter(move |row| row.generator == kind)
+/// A figure in words, with its unit if that is not an error's: `kinematic_error_pp_arcsec`, `k2_n_m_per_rad`.
+fn words_of(name: &str) -> String {
+    let units = [("_arcsec", ""), ("_n_m_per_rad", ", N·m/rad"), ("_n_m", ", N·m"), ("_mpa", ", MPa"), ("_um", ", µm")];
+    let (words, unit) =
+        units.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit))).unwrap_or((name, ""));
+    let mut words = words.replace("_pp", ", peak to peak").replace('_', " ");
+    words[..1].make_ascii_uppercase();
+    words + unit
 }
 
-fn headline(of: &SweepSources<'_>, one: &OfGenerator) -> Headline {
-    let choice = Some(one.generator.to_string());
-    let count = rows(of, one).count();
-    if of.plan.is_of_tolerances() {
-        let spread = one.figures.iter().find(|spread| spread.figure == ERROR);
-        let number = spread.map_or(f64::NAN, |spread| at(spread, JUDGED));
-        let first = one.ranks.iter().find(|rank| rank.figure == ERROR).map_or_else(String::new, |first| {
-            let by = significant(first.correlation, 2);
-            format!("Tighten {} first: the error follows it most (rank correlation {by}). ", first.input)
-        });
-        let answer = RichText::new(format!("{first}Of {count} drives 95 % stay below ")).error(number, 3).plain(".");
-        let number_is = "error peak to peak that 95 % of the drives stay below".to_owned();
-        return Headline { choice, answer, number: RichText::arcsec(number, 3), number_is };
-    }
-    let meet = rows(of, one).filter(|row| row.meets).count();
-    let optimal = match one.front.len() {
-        0 => String::new(),
-        count => format!("; {count} of them are Pareto-optimal"),
-    };
-    let target = of.judge.targets.first().map_or("", |(name, _)| name.as_str());
-    let best = rows(of, one).find(|row| Some(&(row.variant + 1)) == one.front.first());
-    let best = best.and_then(|row| Some(row.figures[of.plan.figure(target)?]));
-    Headline {
-        choice,
-        answer: RichText::new(format!("{meet} of {count} variants meet the constraints{optimal}.")),
-        number: value(target, best.unwrap_or(f64::NAN)),
-        number_is: format!("{target}, of the best"),
-    }
-}
-
-/// A table for each generator; none without rows.
-fn tables(of: &SweepSources<'_>, make: impl Fn(&OfGenerator) -> PageTable) -> Vec<PageBlock> {
-    let table = |one: &OfGenerator| (Some(one.generator.to_string()), make(one));
-    let all = of.sweep.generators.iter().map(table).filter(|(_, table)| !table.rows.is_empty());
-    all.map(|(choice, table)| PageBlock::Table { choice, table }).collect()
-}
-
-/// Variants by two figures: by two targets, drives drawn from tolerances by their error and their lost motion.
-fn trade(of: &SweepSources<'_>) -> PageSection {
+/// The first two targets, or figures that stand for them: their names.
+fn targets<'a>(of: &'a SweepSources<'_>) -> [&'a str; 2] {
     let usual = if of.plan.is_of_tolerances() {
         [ERROR, "lost_motion_arcsec"]
     } else {
@@ -146,50 +115,136 @@ fn trade(of: &SweepSources<'_>) -> PageSection {
     };
     let target = |k: usize, other: &'static str| of.judge.targets.get(k).map_or(other, |(name, _)| name.as_str());
     let first = target(0, usual[0]);
-    let second = target(1, if first == usual[1] { usual[0] } else { usual[1] });
-    let [x, y] = [first, second].map(|name| of.plan.figure(name).unwrap_or_default());
-    let chart = |one: &OfGenerator| {
-        let series = |name: &str, colour: usize, mark: Mark, which: &dyn Fn(&VariantRow) -> bool| {
-            let points = rows(of, one).filter(|row| which(row)).map(|row| [row.figures[x], row.figures[y]]);
-            let points = points.filter(|[x, y]| x.is_finite() && y.is_finite()).take(MOST_POINTS);
-            ChartSeries::sorted(name, mark, colour, points.collect())
-        };
-        let series = vec![
-            series("does not meet", 5, Mark::Dots, &|row| !row.meets),
-            series("meets", 0, Mark::Points, &|row| row.meets && !row.is_front),
-            series("Pareto-optimal", 1, Mark::Points, &|row| row.is_front),
-        ];
-        (one.generator.to_string(), Lines::of(series))
+    [first, target(1, if first == usual[1] { usual[0] } else { usual[1] })]
+}
+
+/// Of drives drawn from tolerances with a generator: what to tighten, and the error that most stay below.
+fn drawn(of: &SweepSources<'_>, one: &OfGenerator) -> Headline {
+    let spread = one.figures.iter().find(|spread| spread.figure == ERROR);
+    let number = spread.map_or(f64::NAN, |spread| at(spread, JUDGED));
+    let first = one.ranks.iter().find(|rank| rank.figure == ERROR).map_or_else(String::new, |first| {
+        let by = significant(first.correlation, 2);
+        format!("Tighten {} first: the error follows it most (rank correlation {by}). ", first.input)
+    });
+    let count = of.sweep.rows.iter().filter(|row| row.generator == one.generator).count();
+    let answer = RichText::new(format!("{first}Of {count} drives 95 % stay below ")).error(number, 3).plain(".");
+    let number_is = "error peak to peak that 95 % of the drives stay below".to_owned();
+    Headline { choice: Some(one.generator.to_string()), answer, number: RichText::arcsec(number, 3), number_is }
+}
+
+/// Of variants: which is best in the first target, and which in the second.
+fn best(of: &SweepSources<'_>) -> Headline {
+    let SweepSources { plan, sweep, judge, .. } = of;
+    let (meet, all) = (sweep.meet, sweep.rows.len());
+    let front = || sweep.rows.iter().filter(|row| row.is_front);
+    let best = judge.targets.iter().filter_map(|(name, sense)| {
+        let figure = plan.figure(name)?;
+        let cost = |row: &&VariantRow| sense.cost(row.figures[figure]);
+        let row = front().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
+        Some((name, *sense, row, row.figures[figure]))
+    });
+    let mut best = best.take(2);
+    let Some((name, _, first, number)) = best.next() else {
+        let answer = format!("None of {all} variants meets the constraints.");
+        return Headline::new(answer.into(), RichText::new("–"), "variants that meet the constraints");
     };
-    let (title, charts) = (format!("{second} against {first}"), of.sweep.generators.iter().map(chart).collect());
-    let axes = [first, second].map(|name| ChartAxis::new(name, quantity(name)));
+    let sets = |row: &VariantRow| {
+        let sets =
+            plan.columns.iter().zip(&plan.variants[row.variant]).map(|(path, value)| format!("{path} = {value}"));
+        [row.generator.in_words().to_owned()].into_iter().chain(sets).collect::<Vec<_>>().join(", ")
+    };
+    let mut answer = RichText::new(format!("Best of {meet} variants that meet the constraints: {}", sets(first)));
+    if let Some((other, sense, row, second)) = best.next() {
+        let most = if sense == Sense::Least { "least" } else { "largest" };
+        let of = if std::ptr::eq(row, first) { "the same".to_owned() } else { sets(row) };
+        answer = answer.plain(format!("; {most} {}: {of}, ", words_of(other)));
+        answer.0.extend(value(other, second).0);
+    }
+    Headline::new(answer.plain("."), value(name, number), format!("{}, of the best", words_of(name)))
+}
+
+/// A table for each generator; none without rows.
+fn tables(of: &SweepSources<'_>, make: impl Fn(&OfGenerator) -> PageTable) -> Vec<PageBlock> {
+    let table = |one: &OfGenerator| {
+        let table = make(one);
+        let choice = of.plan.is_of_tolerances().then(|| one.generator.to_string());
+        (choice, PageTable { caption: format!("{}: {}", one.generator, table.caption), ..table })
+    };
+    let all = of.sweep.generators.iter().map(table).filter(|(_, table)| !table.rows.is_empty());
+    all.map(|(choice, table)| PageBlock::Table { choice, table }).collect()
+}
+
+/// Points of a generator's variants in a chart.
+fn points(of: &SweepSources<'_>, place: &dyn Fn(&VariantRow) -> [f64; 2]) -> Vec<ChartSeries> {
+    let series = |name: String, colour: usize, mark: Mark, which: &dyn Fn(&VariantRow) -> bool| {
+        let points = of.sweep.rows.iter().filter(|row| which(row)).map(place);
+        let points = points.filter(|[x, y]| x.is_finite() && y.is_finite()).take(MOST_POINTS);
+        ChartSeries::sorted(name, mark, colour, points.collect())
+    };
+    let of_generator = |(colour, one): (usize, &OfGenerator)| {
+        let (kind, name) = (one.generator, one.generator.in_words());
+        let meets = series(name.to_owned(), colour, Mark::Dots, &|row| row.generator == kind && row.meets);
+        let front = |row: &VariantRow| row.generator == kind && row.is_front;
+        [meets, series(format!("{name}, Pareto-optimal"), colour, Mark::Points, &front)]
+    };
+    let fails = series("does not meet the constraints".to_owned(), 5, Mark::Dots, &|row| !row.meets);
+    let mut all: Vec<_> = of.sweep.generators.iter().enumerate().flat_map(of_generator).chain([fails]).collect();
+    all.retain(|series| !series.points.is_empty());
+    all
+}
+
+/// The targets over the field where one alone varies, else variants by two figures: by two targets, drives drawn from
+/// tolerances by their error and their lost motion.
+fn trade(of: &SweepSources<'_>) -> PageSection {
+    let [first, second] = targets(of);
+    let place = |name: &str| of.plan.figure(name).unwrap_or_default();
+    let axis = |name: &str| ChartAxis::new(words_of(name), quantity(name));
     let caption = format!("Each point is a variant; of each kind at most {MOST_POINTS} are shown.");
-    let figure = PageBlock::lines("trade", title.as_str(), caption, axes, charts);
-    PageSection::new("trade", title, Detail::Summary, vec![figure])
+    let number = |row: &VariantRow| of.plan.variants[row.variant][0].parse().unwrap_or(f64::NAN);
+    let field = of.plan.columns.first().filter(|_| of.plan.columns.len() == 1);
+    let mut blocks = Vec::new();
+    if let Some(field) = field.filter(|_| of.sweep.rows.iter().all(|row| number(row).is_finite())) {
+        for (id, name) in [("curve", first), ("second-curve", second)] {
+            let mut series = points(of, &|row| [number(row), row.figures[place(name)]]);
+            let lines = series.iter_mut().filter(|series| series.colour < 5 && series.mark == Mark::Dots);
+            lines.for_each(|series| series.mark = Mark::Line);
+            let title = format!("{} over {field}", words_of(name));
+            let axes = [ChartAxis::new(field.as_str(), PageQuantity::Count), axis(name)];
+            blocks.push(PageBlock::lines(id, title, caption.as_str(), axes, Lines::of(series).for_every_choice()));
+        }
+    }
+    let title = format!("{} against {}", words_of(second), words_of(first));
+    let series = points(of, &|row| [row.figures[place(first)], row.figures[place(second)]]);
+    let axes = [axis(first), axis(second)];
+    blocks.push(PageBlock::lines("trade", title, caption, axes, Lines::of(series).for_every_choice()));
+    PageSection::new("picture", "The variants", blocks)
 }
 
 /// The Pareto front, the targets first.
-fn front(of: &SweepSources<'_>, one: &OfGenerator) -> PageTable {
-    let targets = &of.judge.targets;
+fn front(of: &SweepSources<'_>) -> PageBlock {
+    let SweepSources { plan, sweep, judge, .. } = of;
     let (first, others): (Vec<&str>, Vec<&str>) =
-        of.plan.figures().into_iter().partition(|name| targets.iter().any(|(target, _)| target == name));
+        plan.figures().into_iter().partition(|name| judge.targets.iter().any(|(target, _)| target == name));
     let word = |sense: Sense| if sense == Sense::Least { "least" } else { "most" };
-    let better = targets.iter().map(|(name, sense)| format!("{} {name}", word(*sense))).collect::<Vec<_>>().join(", ");
-    let row = |number: &usize| {
-        let row = rows(of, one).find(|row| row.variant + 1 == *number)?;
+    let better = judge.targets.iter().map(|(name, sense)| format!("{} {name}", word(*sense)));
+    let better = better.collect::<Vec<_>>().join(", ");
+    let row = |row: &VariantRow| -> Vec<RichText> {
         let cells = |names: &[&str]| -> Vec<RichText> {
-            names.iter().map(|name| value(name, of.plan.figure(name).map_or(f64::NAN, |k| row.figures[k]))).collect()
+            names.iter().map(|name| value(name, plan.figure(name).map_or(f64::NAN, |k| row.figures[k]))).collect()
         };
-        let values = of.plan.variants[row.variant].iter().cloned().map(RichText::new).collect();
-        Some([vec![number.to_string().into()], cells(&first), values, cells(&others)].concat())
+        let values = plan.variants[row.variant].iter().cloned().map(RichText::new).collect();
+        let head = vec![(row.variant + 1).to_string().into(), row.generator.in_words().into()];
+        [head, cells(&first), values, cells(&others)].concat()
     };
-    let columns = of.plan.columns.iter().map(String::as_str);
-    let header = ["Variant"].into_iter().chain(first.iter().copied()).chain(columns).chain(others.iter().copied());
-    PageTable {
-        caption: format!("Variants that no other beats in all of: {better}. All variants are in sweep.csv"),
-        header: header.map(str::to_owned).collect(),
-        rows: one.front.iter().take(MOST_ROWS).filter_map(row).collect(),
+    let columns = plan.columns.iter().map(String::as_str);
+    let head = ["Variant", "Generator"].into_iter();
+    let header: Vec<&str> = head.chain(first.iter().copied()).chain(columns).chain(others.iter().copied()).collect();
+    let caption = format!("Variants that no other beats in all of: {better}. All variants are in sweep.csv");
+    let mut rows: Vec<&VariantRow> = sweep.rows.iter().filter(|row| row.is_front).collect();
+    if let Some((figure, sense)) = judge.targets.first().and_then(|(name, sense)| Some((plan.figure(name)?, sense))) {
+        rows.sort_by(|a, b| sense.cost(a.figures[figure]).total_cmp(&sense.cost(b.figures[figure])));
     }
+    PageBlock::table(caption, &header, rows.into_iter().take(MOST_ROWS).map(row).collect())
 }
 
 /// Rank correlations of each figure, the strongest first.

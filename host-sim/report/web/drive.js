@@ -81,7 +81,7 @@ export function driveViewer(place, animations) {
     const [width, height] = size;
     const beside = width > height * 1.3;
     const whole = beside ? { left: 0, top: 0, width: height, height } : { left: 0, top: 0, width, height: width };
-    whole.scale = (0.485 * Math.min(whole.width, whole.height)) / drive.reach;
+    whole.scale = (0.44 * Math.min(whole.width, whole.height)) / drive.reach;
     whole.centre = [0, 0];
     whole.turn = 0;
     const close = beside
@@ -210,30 +210,43 @@ export function driveViewer(place, animations) {
     ctx.stroke();
   }
 
+  /** Arrows of one scale, by which all of them stay within the view. */
   function drawForces(view, isClose) {
-    const longest = (isClose ? 0.26 : 0.16) * Math.min(view.width, view.height);
     const { first, count } = isClose ? near(drive.flexspline, 0) : { first: 0, count: drive.flexspline.sectors };
     ctx.lineWidth = (isClose ? 2.25 : 1.25) * ratio;
+    const right = view.left + view.width;
+    const bottom = view.top + view.height;
+    // Teeth at the edge of the close view are seen in part: their forces are left to the view beside it.
+    const rim = isClose ? 0.08 * view.width : 0;
+    const arrows = [];
+    let longest = (isClose ? 0.26 : 0.16) * Math.min(view.width, view.height);
     for (let sector = first; sector < first + count; sector++) {
       for (const { kind, force, point } of drive.forcesOn(sector, drive.count(psi), factor)) {
-        const length = (longest * Math.hypot(...force)) / drive.largestForce;
-        if (length < 2 * ratio) continue;
         const [x, y] = toScreen(view, point);
+        if (x < view.left + rim || x > right - rim || y < view.top || y > bottom) continue;
         const [fx, fy] = rotated(force, -view.turn);
-        const size = Math.hypot(fx, fy);
-        const [ux, uy] = [fx / size, -fy / size];
-        ctx.strokeStyle = ctx.fillStyle = colour(kind === "flank" ? "force-flank" : "force-bore");
-        ctx.beginPath();
-        ctx.moveTo(x - ux * length, y - uy * length);
-        ctx.lineTo(x, y);
-        ctx.stroke();
-        const head = Math.min(6 * ratio, 0.5 * length);
-        ctx.beginPath();
-        ctx.moveTo(x, y);
-        ctx.lineTo(x - ux * head - uy * head * 0.5, y - uy * head + ux * head * 0.5);
-        ctx.lineTo(x - ux * head + uy * head * 0.5, y - uy * head - ux * head * 0.5);
-        ctx.fill();
+        const share = Math.hypot(fx, fy) / drive.largestForce;
+        if (share * longest < 2 * ratio) continue;
+        const [ux, uy] = [fx / Math.hypot(fx, fy), -fy / Math.hypot(fx, fy)];
+        const across = (ux > 0 ? x - view.left : right - x) / Math.abs(ux);
+        const along = (uy > 0 ? y - view.top : bottom - y) / Math.abs(uy);
+        longest = Math.min(longest, Math.min(across, along) / share);
+        arrows.push({ kind, x, y, ux, uy, share });
       }
+    }
+    for (const { kind, x, y, ux, uy, share } of arrows) {
+      const length = share * longest;
+      ctx.strokeStyle = ctx.fillStyle = colour(kind === "flank" ? "force-flank" : "force-bore");
+      ctx.beginPath();
+      ctx.moveTo(x - ux * length, y - uy * length);
+      ctx.lineTo(x, y);
+      ctx.stroke();
+      const head = Math.min(6 * ratio, 0.5 * length);
+      ctx.beginPath();
+      ctx.moveTo(x, y);
+      ctx.lineTo(x - ux * head - uy * head * 0.5, y - uy * head + ux * head * 0.5);
+      ctx.lineTo(x - ux * head + uy * head * 0.5, y - uy * head - ux * head * 0.5);
+      ctx.fill();
     }
   }
 
@@ -267,7 +280,7 @@ export function driveViewer(place, animations) {
     find(".angle").textContent = `${degrees.toFixed(2)}°`;
     find(".looking").textContent = degreesOf(look);
     find(".times").textContent = factor < 9.95 ? factor.toFixed(1) : factor.toFixed(0);
-    const { torque_n_m, temperature_c, colour_end_mpa, peak_mpa } = drive.description;
+    const { torque_n_m, temperature_c, peak_mpa } = drive.description;
     const output = written(modulo(drive.output(psi) / DEGREE, 360), "degree", 5);
     const largest = written(drive.largestForce, "force", 3);
     find(".readout").textContent =
@@ -277,8 +290,8 @@ export function driveViewer(place, animations) {
         ? " Displacements are exaggerated: that wheels overlap is the picture's doing, not the drive's."
         : "");
     find(".low").textContent = "0";
-    find(".high").textContent = `${colour_end_mpa} MPa`;
-    find(".what").textContent = `von Mises stress; largest anywhere ${written(peak_mpa, "stress", 3)}`;
+    find(".high").textContent = written(peak_mpa, "stress", 3);
+    find(".what").textContent = "von Mises stress, to the largest anywhere";
   }
 
   /** Turns the generator; the charts follow unless they asked. */

@@ -1,4 +1,4 @@
-// The page at work: what is chosen is shown; units, detail, links, print.
+// The page at work: what is chosen is shown; units, links, print.
 import { EVERY, lineChart } from "./charts.js";
 import { driveViewer } from "./drive.js";
 import { fieldMap } from "./fields.js";
@@ -60,13 +60,6 @@ async function start() {
     }
   }
 
-  function setDetail(level) {
-    const levels = ["summary", "engineering", "full"];
-    for (const section of document.querySelectorAll("section[data-detail]")) {
-      section.querySelector("details").open = levels.indexOf(section.dataset.detail) <= levels.indexOf(level);
-    }
-  }
-
   function goTo(anchor) {
     const target = anchor && document.getElementById(anchor);
     if (!target) return;
@@ -79,8 +72,6 @@ async function start() {
   }
   const units = document.getElementById("units");
   units.addEventListener("change", () => setUnits(units.value));
-  const detail = document.getElementById("detail");
-  detail.addEventListener("change", () => setDetail(detail.value));
   addEventListener("hashchange", async () => {
     const { choice, anchor } = asked();
     if (choice && choice !== root.dataset.chosen) await choose(choice);

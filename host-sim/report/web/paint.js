@@ -17,7 +17,7 @@ export class Painter {
   }
 
   load(motion) {
-    this.colourEnd = motion.description.colour_end_mpa;
+    this.colourEnd = motion.description.peak_mpa;
     this.used = new Map();
   }
 
@@ -34,32 +34,37 @@ export class Painter {
     const { nodeCount, elements, outline } = wheel;
     // Places and stresses of a sector and of its neighbour, by index as in `elements`.
     const [x, y, stress] = [0, 1, 2].map(() => new Float32Array(2 * nodeCount));
-    const level = BUCKETS / (4 * this.colourEnd);
-    const add = (xa, ya, xb, yb, xc, yc, xd, yd, sum) => {
-      const path = fills[Math.min(BUCKETS - 1, Math.floor(sum * level))];
-      path.moveTo(xa, ya);
-      path.lineTo(xb, yb);
-      path.lineTo(xc, yc);
-      path.lineTo(xd, yd);
+    const level = BUCKETS / this.colourEnd;
+    const add = (k, polygon) => {
+      const path = fills[Math.min(BUCKETS - 1, Math.max(0, k))];
+      polygon.forEach(([x, y], place) => path[place ? "lineTo" : "moveTo"](x, y));
+      path.closePath();
+    };
+    /** A triangle in bands of one colour: stress is linear within it. */
+    const shade = (corners) => {
+      const levels = corners.map(([, , value]) => value);
+      const [low, high] = [Math.floor(Math.min(...levels)), Math.floor(Math.max(...levels))];
+      for (let k = low; k <= high; k++) {
+        const above = k > low ? cut(corners, k, 1) : corners;
+        add(k, k < high ? cut(above, k + 1, -1) : above);
+      }
     };
     for (let sector = first; sector < first + count; sector++) {
       this.place(wheel, view, sector, frames / wheel.frames, turn, exaggeration, fine, x, y, stress);
       for (let e = 0; e < elements.length; e += 8) {
         const n = elements.subarray(e, e + 8);
         if (!fine) {
-          const [a, b, c, d] = n;
-          const sum = stress[a] + stress[b] + stress[c] + stress[d];
-          add(x[a], y[a], x[b], y[b], x[c], y[c], x[d], y[d], sum);
+          const corners = Array.from(n.subarray(0, 4), (a) => [x[a], y[a], stress[a]]);
+          const mean = corners.reduce((sum, [, , value]) => sum + value / 4, 0);
+          add(Math.floor(mean * level), corners);
           continue;
         }
-        // In quarters about the middle, which the shape functions of the element give.
+        // In triangles about the middle, which the shape functions of the element give.
         const middle = (v) =>
           0.5 * (v[n[4]] + v[n[5]] + v[n[6]] + v[n[7]]) - 0.25 * (v[n[0]] + v[n[1]] + v[n[2]] + v[n[3]]);
-        const [mx, my, ms] = [middle(x), middle(y), Math.max(0, middle(stress))];
-        for (let k = 0; k < 4; k++) {
-          const [a, b, d] = [n[k], n[4 + k], n[4 + ((k + 3) % 4)]];
-          add(x[a], y[a], x[b], y[b], mx, my, x[d], y[d], stress[a] + stress[b] + ms + stress[d]);
-        }
+        const centre = [middle(x), middle(y), level * middle(stress)];
+        const around = [0, 4, 1, 5, 2, 6, 3, 7].map((k) => [x[n[k]], y[n[k]], level * stress[n[k]]]);
+        around.forEach((point, k) => shade([centre, point, around[(k + 1) % 8]]));
       }
       if (!lines) continue;
       for (let e = 0; e < outline.length; e += 3) {
@@ -119,6 +124,18 @@ export class Painter {
       }
     }
   }
+}
+
+/** What of a polygon has values of at least `level`, or with `sign` −1 of at most that. */
+function cut(polygon, level, sign) {
+  const kept = [];
+  polygon.forEach((point, k) => {
+    const next = polygon[(k + 1) % polygon.length];
+    const [here, there] = [sign * (point[2] - level), sign * (next[2] - level)];
+    if (here >= 0) kept.push(point);
+    if (here * there < 0) kept.push(point.map((value, of) => value + (here / (here - there)) * (next[of] - value)));
+  });
+  return kept;
 }
 
 /** A point of the page's frame in pixels of a view. */

@@ -335,16 +335,22 @@ fn remarks(plan: &VariantPlan, sweep: &ReducedSweep) -> Vec<String> {
             errors.join(", ")
         ));
     }
-    for OfGenerator { generator, beyond_kernels, play_closed, .. } in &sweep.generators {
-        let meet = sweep.rows.iter().filter(|row| row.meets && row.generator == *generator);
-        for (count, what) in [
-            (meet.filter(|row| !row.cautions.is_empty()).count(), "that meet the constraints have a caution"),
-            (*beyond_kernels, "drives have axes further apart than the kernels reach; their errors are extrapolated"),
-            (*play_closed, "drives have no play at some place; lost motion there is the wind-up alone"),
-        ] {
-            if count > 0 {
-                remarks.push(format!("{generator}: {count} {what}"));
-            }
+    let runs = |of: &dyn Fn(&VariantRow) -> bool| sweep.rows.iter().filter(|row| of(row)).count();
+    let sum = |of: fn(&OfGenerator) -> usize| sweep.generators.iter().map(of).sum::<usize>();
+    for (count, what) in [
+        (runs(&|row| row.meets && !row.cautions.is_empty()), "runs that meet the constraints have a caution"),
+        (
+            runs(&|row| Judge::is_preloaded(plan, row)),
+            "runs have a backlash below zero: their teeth are preloaded, or did not settle; they are not among the best",
+        ),
+        (
+            sum(|of| of.beyond_kernels),
+            "drives have axes further apart than the kernels reach; their errors are extrapolated",
+        ),
+        (sum(|of| of.play_closed), "drives have no play at some place; lost motion there is the wind-up alone"),
+    ] {
+        if count > 0 {
+            remarks.push(format!("{count} {what}"));
         }
     }
     remarks

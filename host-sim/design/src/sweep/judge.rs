@@ -15,6 +15,9 @@ use flexspline_mechanics::drive::RigidMesh;
 const USUAL: [(&str, Sense); 3] =
     [("kinematic_error_pp_arcsec", Sense::Least), ("k2_n_m_per_rad", Sense::Most), ("root_fillet_mpa", Sense::Least)];
 
+/// Backlash from which on teeth play, arcsec. A guess: below it they are preloaded beyond what a solution is good to.
+const LEAST_BACKLASH_ARCSEC: f64 = -0.1;
+
 /// A range that a figure has to keep to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constraint {
@@ -61,7 +64,7 @@ pub enum Sense {
 
 impl Sense {
     /// A figure, turned so that less is better; a missing one is worst.
-    pub(super) fn cost(self, value: f64) -> f64 {
+    pub fn cost(self, value: f64) -> f64 {
         let cost = if self == Sense::Least { value } else { -value };
         if cost.is_nan() { f64::INFINITY } else { cost }
     }
@@ -111,8 +114,14 @@ impl Judge {
         self.targets.iter().filter_map(|(name, sense)| Some((plan.figure(name)?, *sense))).collect()
     }
 
-    /// Marks the rows that meet: they converged, their rigid teeth clear one another where that was looked at, and they
-    /// keep to every constraint. Of these it marks the Pareto front of each generator. Rows are compared with those
+    /// Whether the backlash of a variant is below zero: its teeth are preloaded, or did not settle.
+    pub fn is_preloaded(plan: &VariantPlan, row: &VariantRow) -> bool {
+        let backlash = plan.figure("backlash_arcsec").filter(|_| !plan.is_of_tolerances());
+        backlash.is_some_and(|figure| row.figures[figure] < LEAST_BACKLASH_ARCSEC)
+    }
+
+    /// Marks the rows that meet: they converged, their rigid teeth clear one another where that was looked at, their
+    /// teeth play, and they keep to every constraint. Of these it marks the Pareto front. Rows are compared with those
     /// that have the same manufacturing errors, which nobody chooses.
     pub(super) fn mark(&self, plan: &VariantPlan, rows: &mut [VariantRow]) {
         let least_gap_um = -1e3 * RigidMesh::TOUCHES_MM;
@@ -122,7 +131,8 @@ impl Judge {
         let kept: Vec<(usize, RangeInclusive<f64>)> = clears.into_iter().chain(kept).collect();
         for row in rows.iter_mut() {
             let keeps = |(figure, range): &(usize, RangeInclusive<f64>)| range.contains(&row.figures[*figure]);
-            row.meets = row.status == RunStatus::Converged && kept.iter().all(keeps);
+            let sound = row.status == RunStatus::Converged && !Judge::is_preloaded(plan, row);
+            row.meets = sound && kept.iter().all(keeps);
         }
         let targets = self.targets_in(plan);
         let cost = |row: &VariantRow, (figure, sense): (usize, Sense)| sense.cost(row.figures[figure]);
@@ -130,7 +140,6 @@ impl Judge {
         let beats = |a: &VariantRow, b: &VariantRow| {
             let [made, other] = [a, b].map(|row| &plan.variants[row.variant]);
             a.meets
-                && a.generator == b.generator
                 && targets.iter().all(|of| cost(a, *of) <= cost(b, *of))
                 && targets.iter().any(|of| cost(a, *of) < cost(b, *of))
                 && errors.iter().all(|k| made[*k] == other[*k])

@@ -478,6 +478,20 @@ fn constraints_leave_out_and_the_front_is_pareto_optimal() {
     assert_eq!(rows.iter().map(|row| row.is_front).collect::<Vec<_>>(), [true, false, false, false, true]);
 }
 
+#[test]
+fn the_front_is_of_all_generators_and_of_teeth_that_play() {
+    let kinds = [GeneratorKind::Cam, GeneratorKind::DoubleDisc];
+    let plan = of_fields(&["generator.w0_mm=0.46..0.5:2"], &kinds).unwrap();
+    let (error, backlash) = ("kinematic_error_pp_arcsec", "backlash_arcsec");
+    let of = |k: usize, e, b| row(&plan, k / 2, &[(error, e), (backlash, b)]);
+    let mut rows = vec![of(0, 2.0, 30.0), of(1, 1.0, 30.0), of(2, 0.5, -20.0), of(3, 3.0, 0.0)];
+    rows.iter_mut().zip(kinds.iter().cycle()).for_each(|(row, kind)| row.generator = *kind);
+    let judge = Judge { constraints: Vec::new(), targets: vec![(error.to_owned(), Sense::Least)] }.of(&plan).unwrap();
+    judge.mark(&plan, &mut rows);
+    assert_eq!(rows.iter().map(|row| row.meets).collect::<Vec<_>>(), [true, true, false, true]);
+    assert_eq!(rows.iter().map(|row| row.is_front).collect::<Vec<_>>(), [false, true, false, false]);
+}
+
 /// The variant made worse has the smaller error where it was looked at; it is compared with those made alike alone.
 #[test]
 fn variants_are_compared_with_those_made_alike() {

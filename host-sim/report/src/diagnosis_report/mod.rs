@@ -1,8 +1,9 @@
 //! The page of a diagnosis: what an analyst with a log file sees.
 //!
-//! The answer first, in one sentence and one number; then the causes and what to record next; then the picture, the
-//! gain, and the faults of the data. Residuals come row by row in three levels (nominal, recalibrated, with the
-//! causes), and a selector shows the picture of each: the last is without what the causes explain.
+//! The answer first, in one sentence and one number; then the causes, the picture and what to record next; the rest is
+//! folded: the gain, the pictures of orders and over time, the data. Residuals come row by row in three levels (nominal,
+//! recalibrated, with the causes), and a selector shows the picture of each: the last is without what the causes
+//! explain.
 
 mod orders;
 mod picture;
@@ -14,7 +15,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::page::{
-    ChartAxis, Choice, Detail, Headline, Lines, Page, PageBlock, PageQuantity, PageSection, RichText, SIGNS, Status,
+    ChartAxis, Choice, Headline, Lines, Page, PageBlock, PageQuantity, PageSection, RichText, SIGNS, Status,
     significant,
 };
 use flexspline_base::robust::least_and_most;
@@ -131,11 +132,11 @@ impl DiagnosisKnown<'_> {
     fn page(&self) -> Page {
         let DiagnosisSources { recording, nominal, diagnosis, command, inputs, .. } = &self.sources;
         let (status, also) = self.status();
-        let mut sections: Vec<PageSection> = self.causes().into_iter().chain([self.next()]).collect();
-        sections.extend(self.picture_sections());
-        sections.push(self.before_and_after());
-        sections.push(why::in_short(diagnosis));
-        sections.extend([self.gain(), self.data(), self.reading()]);
+        let [picture, pictures @ ..] = self.picture_sections();
+        let mut sections: Vec<PageSection> = self.causes().into_iter().chain([picture, self.next()]).collect();
+        sections.extend([self.gain(), self.before_and_after(), why::in_short(diagnosis)]);
+        sections.extend(pictures);
+        sections.extend([self.data(), self.reading()]);
         let teeth = nominal
             .teeth
             .map_or_else(String::new, |teeth| format!(", {} and {} teeth", teeth.flexspline, teeth.circular_spline));
@@ -306,7 +307,7 @@ impl DiagnosisKnown<'_> {
                 &mut parts.map(|(k, part)| (part.cause.words(), part.adds_arcsec.as_slice(), k)),
             ));
         }
-        PageSection::new("before-after", "Before and after", Detail::Summary, blocks)
+        PageSection::folded("before-after", "Before and after", blocks)
     }
 
     fn time_axis(&self) -> ChartAxis {
@@ -343,17 +344,9 @@ impl DiagnosisKnown<'_> {
             ];
             let rows = diagnosis.causes.iter().map(row).collect();
             blocks.push(PageBlock::table("Causes, strongest first", &header, rows));
-            blocks.push(PageBlock::paragraph(format!(
-                "Confidence: that it is this cause and not its best rival, given that it is one of the library. Gain: \
-                 share of the squared error of the recalibrated nominal model that it removes in {}. Look-alikes: \
-                 causes that these data cannot distinguish from it. Parameters are of the model that was fitted; µm \
-                 are displacements on the pitch circle.",
-                self.left_out()
-            )));
-            blocks.extend(diagnosis.causes.iter().map(|cause| {
-                let name = RichText::default().strong(words::begun(cause.name.words()));
-                PageBlock::paragraph(name.plain(format!(": {}.", cause.name.does())))
-            }));
+            let does =
+                diagnosis.causes.iter().map(|of| format!("{}: {}.", words::begun(of.name.words()), of.name.does()));
+            blocks.push(PageBlock::paragraph(does.collect::<Vec<_>>().join(" ")));
         }
         if !diagnosis.unexplained.is_empty() {
             let row = |left: &Unexplained| {
@@ -368,12 +361,13 @@ impl DiagnosisKnown<'_> {
             };
             blocks.push(PageBlock::paragraph(sure));
         }
-        (!blocks.is_empty()).then(|| PageSection::new("causes", "Causes", Detail::Summary, blocks))
+        (!blocks.is_empty()).then(|| PageSection::new("causes", "Causes", blocks))
     }
 
     /// The gain of the causes.
     fn gain(&self) -> PageSection {
-        let Diagnosis { residual, held_out, compensation, .. } = self.sources.diagnosis;
+        let Diagnosis { residual, held_out, compensation, noise_arcsec, wander_correlation_s, .. } =
+            self.sources.diagnosis;
         let row = |name: &str, before: f64, after: f64| {
             let change = if before > 0.0 { format!("{:+.0} %", 100.0 * (after / before - 1.0)) } else { "–".into() };
             let [before, after] = [before, after].map(|arcsec| RichText::arcsec(arcsec, 3));
@@ -391,13 +385,18 @@ impl DiagnosisKnown<'_> {
             0 | 1 => String::new(),
             rows => format!(" in means of {rows} rows"),
         };
+        let unit = if self.rows.recorded.time { "s" } else { "rows" };
         let noise = format!(
-            "Noise and drift of the measurement are {{}} of it{means}; {} of the squared error beyond that is left \
-             unexplained. A table on board is not adapted to the zero, stiffness and backlash of these data, and so \
-             leaves another error.",
+            "Noise and drift of the measurement are {{}} of it{means}: white noise of {{}} in a row, and red noise of \
+             {{}} with a correlation time of {} {unit}. {} of the squared error beyond that is left unexplained. A \
+             table on board is not adapted to the zero, stiffness and backlash of these data, and so leaves another \
+             error.",
+            significant(*wander_correlation_s, 2),
             words::percent(residual.unexplained_fraction)
         );
-        let noise = PageBlock::paragraph(RichText::filled(&noise, &[(residual.noise_floor_arcsec, 3)]));
+        let [white, red] = *noise_arcsec;
+        let errors = [(residual.noise_floor_arcsec, 3), (white, 2), (red, 2)];
+        let noise = PageBlock::paragraph(RichText::filled(&noise, &errors));
         let none = compensation.rms_uncompensated_arcsec;
         let line = |name: &str, arcsec: f64| {
             let share = if none > 0.0 { format!("{:.0} %", 100.0 * arcsec / none) } else { "–".into() };
@@ -427,7 +426,7 @@ impl DiagnosisKnown<'_> {
                  encoder.",
             ));
         }
-        PageSection::new("gain", "What it gains", Detail::Summary, blocks)
+        PageSection::folded("gain", "What it gains", blocks)
     }
 
     /// The free parameters of the nominal model, with the order of a harmonic.
@@ -469,7 +468,7 @@ impl DiagnosisKnown<'_> {
             ),
             None => RichText::new("Nothing: no two causes explain these data equally well."),
         };
-        PageSection::new("next", "What to record next", Detail::Summary, vec![PageBlock::paragraph(text)])
+        PageSection::new("next", "What to record next", vec![PageBlock::paragraph(text)])
     }
 
     /// The data: sessions, faults, notes.
@@ -528,8 +527,7 @@ impl DiagnosisKnown<'_> {
         let sessions: Vec<(usize, &Session)> = recording.sessions.iter().enumerate().collect();
         let header = ["Session", "Rows", "Time, s", "Generator, turns", "Torque, N·m", "Temperature, °C"];
         blocks.extend(limited("Sessions", &header, &sessions, row));
-        let detail = if recording.faults.is_empty() { Detail::Engineering } else { Detail::Summary };
-        PageSection::new("data", "The data", detail, blocks)
+        PageSection::folded("data", "The data", blocks)
     }
 
     fn reading(&self) -> PageSection {
@@ -540,6 +538,13 @@ impl DiagnosisKnown<'_> {
                  to this unit, and of what is left with the causes that were named. A cause that is right takes its \
                  marks away in the last without putting others in their place.",
             ),
+            PageBlock::paragraph(format!(
+                "Confidence: that it is this cause and not its best rival, given that it is one of the library. Gain: \
+                 share of the squared error of the recalibrated nominal model that it removes in {}. Look-alikes: \
+                 causes that these data cannot distinguish from it. Parameters are of the model that was fitted; µm \
+                 are displacements on the pitch circle.",
+                self.left_out()
+            )),
             PageBlock::paragraph(format!(
                 "A name is given only where a cause gains in {}, where no rival does as well, and where it is large \
                  enough against noise and against how wrong its model may be. The rest is described and not named.",

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use super::thin::{dots, medians, some_rows};
 use super::{DiagnosisKnown, Shown, orders, words};
 use crate::page::{
-    ChartAxis, ChartSeries, Detail, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection,
-    RichText, Upright, significant,
+    ChartAxis, ChartSeries, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection, RichText,
+    Upright, significant,
 };
 use flexspline::FixedMember;
 use flexspline_base::robust::{least_and_most, median_of};
@@ -17,8 +17,6 @@ const MAP: [usize; 2] = [72, 36];
 /// Medians over a quantity, and rows that each needs.
 const MEDIANS: usize = 24;
 const FEWEST_IN_MEDIAN: usize = 12;
-/// Bins of a turn: 3 degrees, a third of the arc over which teeth engage.
-const BINS_OF_TURN: usize = 120;
 /// A quantity that changes by less than this share of itself is no axis.
 const CHANGES: f64 = 0.03;
 /// Rows that a cell needs before its median is shown.
@@ -26,8 +24,10 @@ const FEWEST_IN_CELL: usize = 2;
 const DIRECTIONS: [(f64, &str); 2] = [(1.0, "forward"), (-1.0, "backward")];
 
 impl DiagnosisKnown<'_> {
-    pub(super) fn picture_sections(&self) -> Vec<PageSection> {
-        vec![self.looks(), self.angles(), self.spectra(), self.drift()]
+    /// The picture that shows most, and the others.
+    pub(super) fn picture_sections(&self) -> [PageSection; 3] {
+        let [first, others] = self.looks();
+        [first, others, self.spectra()]
     }
 
     fn lines(
@@ -69,22 +69,10 @@ impl DiagnosisKnown<'_> {
         (!lines.series.is_empty()).then_some(lines)
     }
 
-    /// By generator angle, torque, temperature, speed, session.
-    fn looks(&self) -> PageSection {
+    /// By both angles, and by generator angle, torque, temperature, speed, session.
+    fn looks(&self) -> [PageSection; 2] {
         let rows = &self.rows;
         let mut blocks = Vec::new();
-        let turns: Vec<f64> = rows.generator.iter().map(|psi| psi / TAU).collect();
-        blocks.extend(self.lines(
-            "over-generator",
-            "Over the generator angle",
-            "Some rows of all, drawn evenly. This is measured error less what the model says, before anybody says why.",
-            ChartAxis::new("Generator angle", PageQuantity::Turn),
-            |shown| {
-                let mut lines = self.over(&turns, shown)?;
-                lines.series.retain(|series| series.mark == Mark::Dots);
-                Some(lines)
-            },
-        ));
         let maps: Vec<(String, FieldMap)> =
             self.shown.iter().filter_map(|shown| Some((shown.level.id.to_owned(), self.map(shown)?))).collect();
         if !maps.is_empty() {
@@ -99,6 +87,18 @@ impl DiagnosisKnown<'_> {
             };
             blocks.push(PageBlock::Figure(Figure::of("map", "Over one turn of generator and output", caption, body)));
         }
+        let turns: Vec<f64> = rows.generator.iter().map(|psi| psi / TAU).collect();
+        blocks.extend(self.lines(
+            "over-generator",
+            "Over the generator angle",
+            "Some rows of all, drawn evenly. This is measured error less what the model says, before anybody says why.",
+            ChartAxis::new("Generator angle", PageQuantity::Turn),
+            |shown| {
+                let mut lines = self.over(&turns, shown)?;
+                lines.series.retain(|series| series.mark == Mark::Dots);
+                Some(lines)
+            },
+        ));
         for (recorded, values, id, over, axis, sees) in [
             (
                 rows.recorded.torque,
@@ -132,7 +132,9 @@ impl DiagnosisKnown<'_> {
                 blocks.extend(self.lines(&format!("over-{id}"), &title, &caption, axis, over));
             }
         }
-        PageSection::new("picture", "What the error looks like", Detail::Summary, blocks)
+        let others = blocks.split_off(blocks.len().min(1));
+        let title = "What the error looks like";
+        [PageSection::new("picture", title, blocks), PageSection::folded("more", "By angle, load and speed", others)]
     }
 
     /// Medians over both turns.
@@ -166,32 +168,6 @@ impl DiagnosisKnown<'_> {
             Angle::GeneratorLessOutput => ("ψ − δ", "circular spline"),
             Angle::Output => ("δ", "output, its encoder and its load"),
         }
-    }
-
-    fn angles(&self) -> PageSection {
-        let mut blocks = Vec::new();
-        for (angle, id) in ANGLES {
-            let (symbol, wheel) = self.angle_name(angle);
-            let turned: Vec<f64> =
-                angle.angles(&self.rows).into_iter().map(|angle| angle.rem_euclid(TAU).to_degrees()).collect();
-            blocks.extend(self.lines(
-                &format!("angle-{id}"),
-                &format!("Over one turn of {symbol}: {wheel}"),
-                "Medians of bins of three degrees, by direction. A sound drive has what its nominal model has, and \
-                 these are flat.",
-                ChartAxis::new(format!("{symbol} in its turn"), PageQuantity::Degree),
-                |shown| {
-                    let values = &shown.level.residual_arcsec;
-                    let series = DIRECTIONS.into_iter().enumerate().map(|(colour, (direction, name))| {
-                        let points = medians(&turned, values, self.rows_in(direction), BINS_OF_TURN, 1);
-                        ChartSeries::new(name, Mark::Line, colour, points)
-                    });
-                    let series: Vec<_> = series.filter(|series| !series.points.is_empty()).collect();
-                    (!series.is_empty()).then(|| Lines::of(series))
-                },
-            ));
-        }
-        PageSection::new("angles", "Over the angle of each wheel", Detail::Engineering, blocks)
     }
 
     fn spectra(&self) -> PageSection {
@@ -243,7 +219,7 @@ impl DiagnosisKnown<'_> {
         if blocks.is_empty() {
             blocks.push(PageBlock::paragraph("The drive turned too little for orders."));
         }
-        PageSection::new("orders", "Orders", Detail::Engineering, blocks)
+        PageSection::folded("orders", "Orders", blocks)
     }
 
     /// The lines of the spectra with the parts that have such orders.
@@ -278,34 +254,6 @@ impl DiagnosisKnown<'_> {
         }
         let header = ["Order", "Amplitude", "Parts with such an order"];
         of_level(shown, "Lines above the noise, strongest first in each angle", &header, rows)
-    }
-
-    fn drift(&self) -> PageSection {
-        let rows = &self.rows;
-        let mut blocks = Vec::new();
-        let caption = "Medians of up to 24 stretches of each session; breaks between sessions are taken out.";
-        blocks.extend(self.lines("drift", "Over time", caption, self.time_axis(), |shown| {
-            let mut points: Vec<[f64; 2]> = Vec::new();
-            for (session, begin) in rows.sessions.iter().zip(&self.clock.begins) {
-                if let Some([x, _]) = points.last().copied() {
-                    points.push([0.5 * (x + begin), f64::NAN]);
-                }
-                let values = &shown.level.residual_arcsec;
-                let stretches = MEDIANS.min(session.len() / (2 * FEWEST_IN_MEDIAN)).max(1);
-                points.extend(medians(&self.clock.at, values, session.clone(), stretches, FEWEST_IN_MEDIAN));
-            }
-            let series = vec![ChartSeries::new("median", Mark::Broken, 0, points)];
-            Some(Lines { series, uprights: self.clock.borders(), ..Lines::default() })
-        }));
-        let diagnosis = self.sources.diagnosis;
-        let unit = if rows.recorded.time { "s" } else { "rows" };
-        let words = format!(
-            "Noise of the diagnosis: white {{}} in a row, red {{}} with a correlation time of {} {unit}.",
-            significant(diagnosis.wander_correlation_s, 2)
-        );
-        let [white, red] = diagnosis.noise_arcsec;
-        blocks.push(PageBlock::paragraph(RichText::filled(&words, &[(white, 2), (red, 2)])));
-        PageSection::new("drift-section", "Drift and noise", Detail::Engineering, blocks)
     }
 }
 

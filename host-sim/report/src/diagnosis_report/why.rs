@@ -2,7 +2,7 @@
 //! diagnosis.json, and `diagnose --explain` prints it.
 
 use super::words;
-use crate::page::{Detail, PageBlock, PageSection, RichText, significant};
+use crate::page::{PageBlock, PageSection, RichText, significant};
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::report::Diagnosis;
@@ -20,7 +20,7 @@ pub(super) fn in_short(diagnosis: &Diagnosis) -> PageSection {
         ),
         PageBlock::table("The gate that decided for each cause", &header, rows),
     ];
-    PageSection::new("why", "Why these causes, and not others", Detail::Engineering, blocks)
+    PageSection::folded("why", "Why these causes, and not others", blocks)
 }
 
 /// Cause, whether it is named, what decided, found, asked for.

@@ -10,8 +10,8 @@ use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::animation::{Animation, AnimationError};
 use flexspline_report::drive_figures::{drive_figure, less_mean, sleeve_figure};
 use flexspline_report::page::{
-    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
-    RichText, Status, significant,
+    ChartAxis, ChartSeries, Choice, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
+    Status, significant,
 };
 
 /// The page; `animations` are the drives in motion, without load.
@@ -113,7 +113,7 @@ fn claims(r: &Reproduction) -> PageSection {
              is no evidence, the difference of the generators is.",
         ),
     ];
-    PageSection::new("claims", "Claim by claim", Detail::Summary, blocks)
+    PageSection::new("claims", "Claim by claim", blocks)
 }
 
 /// Error of the unloaded runs over the generator angle, degrees and arcsec, each in a colour.
@@ -173,5 +173,5 @@ fn errors(r: &Reproduction, animations: &[Animation]) -> PageSection {
          nodes: that its errors come from there is a suspicion.",
         held.collect::<Vec<_>>().join(", ")
     )));
-    PageSection::new("errors-of-generators", "The errors", Detail::Summary, blocks)
+    PageSection::new("errors-of-generators", "The errors", blocks)
 }
