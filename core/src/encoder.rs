@@ -9,7 +9,7 @@
 //! Settings and state are kept as words under a sum ([`whole`](../whole.rs)): where one word was hit by an upset it is
 //! mended in the next call; what is lost gives no angle.
 
-use crate::whole::{Sealed, high, low, sum_of, words};
+use crate::whole::{Sealed, high, low, sum_of};
 use core::fmt;
 
 /// Where a register begins anew.
@@ -62,7 +62,8 @@ pub struct Encoder {
 /// Where an encoder is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderState {
-    at: Sealed<At>,
+    /// The last reading, and the counts since the zero, as the register counts: low and high words.
+    at: Sealed<[u32; 4]>,
 }
 
 impl EncoderSettings {
@@ -81,20 +82,25 @@ impl EncoderSettings {
     }
 }
 
-/// The last reading, bits of the register, and the counts since the zero, as it counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The last reading, and the counts since the zero.
+#[derive(Clone, Copy)]
 struct At {
-    reading: i64,
+    reading: u64,
     since_zero: i64,
 }
-words!([] At { reading, since_zero });
 
 impl EncoderState {
     /// Nowhere: it is not whole.
-    pub const NOWHERE: Self = Self { at: Sealed::of(At { reading: 0, since_zero: 0 }, 0) };
+    pub const NOWHERE: Self = Self { at: Sealed::of([0; 4], 0) };
 
-    fn of(reading: u64, since_zero: i64) -> Self {
-        Self { at: Sealed::new(At { reading: reading as i64, since_zero }) }
+    fn of(At { reading, since_zero }: At) -> Self {
+        Self { at: Sealed::new([low(reading as i64), high(reading as i64), low(since_zero), high(since_zero)]) }
+    }
+
+    fn open(&self) -> Option<At> {
+        let [low, high, since_low, since_high] = self.at.open()?;
+        let long = |low: u32, high: u32| (high as u64) << 32 | low as u64;
+        Some(At { reading: long(low, high), since_zero: long(since_low, since_high) as i64 })
     }
 
     /// Whether it is lost to an upset that cannot be mended: [`Encoder::start`] it again.
@@ -153,7 +159,7 @@ impl Encoder {
         let near = settings.since_zero(near_counts);
         let there = settings.register(near.wrapping_add(settings.zero_counts));
         let way = settings.way(there, reading)?;
-        Some(EncoderState::of(reading, near.wrapping_add(way)))
+        Some(EncoderState::of(At { reading, since_zero: near.wrapping_add(way) }))
     }
 
     /// Takes a reading: less than half of what the register counts since the one before, or half of it backward. False,
@@ -165,9 +171,9 @@ impl Encoder {
     #[must_use]
     pub fn read(&self, state: &mut EncoderState, reading: u64) -> bool {
         let read = || {
-            let (settings, at) = (self.settings()?, state.at.open()?);
-            let way = settings.way(at.reading as u64, reading)?;
-            Some(EncoderState::of(reading, at.since_zero.wrapping_add(way)))
+            let (settings, at) = (self.settings()?, state.open()?);
+            let way = settings.way(at.reading, reading)?;
+            Some(EncoderState::of(At { reading, since_zero: at.since_zero.wrapping_add(way) }))
         };
         let next = read();
         *state = next.unwrap_or(*state);
@@ -187,8 +193,8 @@ impl Encoder {
         largest_move: i32,
     ) -> Option<i64> {
         let settings = self.settings().filter(|settings| settings.half_is_more_than(largest_move, 3))?;
-        let at = state.at.open()?;
-        let way = settings.way(at.reading as u64, reading)?;
+        let at = state.open()?;
+        let way = settings.way(at.reading, reading)?;
         let since_zero = match believed {
             Some((angle, ticks)) if way.unsigned_abs() > settings.counts_of(largest_move) => {
                 if !settings.half_is_more_than(largest_move, ticks.saturating_add(2)) {
@@ -201,7 +207,7 @@ impl Encoder {
             }
             _ => at.since_zero.wrapping_add(way),
         };
-        *state = EncoderState::of(reading, since_zero);
+        *state = EncoderState::of(At { reading, since_zero });
         Some(settings.angle(since_zero))
     }
 
@@ -209,7 +215,7 @@ impl Encoder {
     /// [`OutputAngle::from_counts`](crate::OutputAngle::from_counts). `None` if settings or state are lost.
     #[must_use]
     pub fn angle(&self, state: &EncoderState) -> Option<i64> {
-        let (settings, at) = (self.settings()?, state.at.open()?);
+        let (settings, at) = (self.settings()?, state.open()?);
         Some(settings.angle(at.since_zero))
     }
 
@@ -394,18 +400,18 @@ mod tests {
             let wrap = EncoderWrap::Bits(bits);
             let encoder = made(EncoderSettings { counts_per_turn: per_turn, wrap, reversed, zero_counts: 0 });
             let settings = encoder.settings().unwrap();
-            let reading = settings.register(counts);
-            let state = EncoderState::of(reading, counts);
+            let at = At { reading: settings.register(counts), since_zero: counts };
+            let state = EncoderState::of(at);
             let angle = encoder.angle(&state).unwrap();
             prop_assert_eq!(settings.since_zero(angle), counts);
-            prop_assert_eq!(encoder.reading(angle), reading);
+            prop_assert_eq!(encoder.reading(angle), at.reading);
             let sign = if reversed { -1 } else { 1 };
             let exact = (i128::from(sign * counts) << 32) as f64 / f64::from(per_turn);
             prop_assert!((angle as f64 - exact).abs() <= 0.5 + 1e-15 * exact.abs());
             // A count more is more.
-            let next = EncoderState::of(reading, counts + sign);
+            let next = EncoderState::of(At { since_zero: counts + sign, ..at });
             prop_assert!(encoder.angle(&next).unwrap() > angle);
-            prop_assert_eq!(encoder.start(reading, angle), Some(state));
+            prop_assert_eq!(encoder.start(at.reading, angle), Some(state));
         }
     }
 }

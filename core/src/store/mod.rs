@@ -419,8 +419,8 @@ impl Store {
         Strangers { any: first | second | once, all: first & second | once }
     }
 
-    /// Whether the store's data on the table is whole, and whether an image is not the one that was activated: to be read
-    /// after everything else that a tick reads.
+    /// Whether the store's data on the table is whole, and whether an image is not the one that was activated: to be
+    /// read after everything else that a tick reads.
     #[inline(always)]
     pub(crate) fn table_status(&self, images: &Images<'_>) -> (bool, bool) {
         let strangers = self.strangers(images);

@@ -12,8 +12,8 @@ numbered! { coded
     pub enum Quality {
         /// Inside the range of the table, side of the play known.
         InRange,
-        /// The error is known only to within the uncertainty reported: the torque lies inside a jump, or the side of the
-        /// play is not known yet.
+        /// The error is known only to within the uncertainty reported: the torque lies inside a jump, or the side of
+        /// the play is not known yet.
         Uncertain,
         /// Torque or temperature outside the range the table holds for; the value at its edge is used.
         Extrapolated,
