@@ -132,7 +132,7 @@ impl Bench {
         };
         match read("log.csv", bytes, &ColumnMap::default(), &table, 20.0, true) {
             Ok(read) => {
-                let (replayed, summary) = replay(&table, &read.rows);
+                let (replayed, summary) = replay(&table, &read.rows, None);
                 let whole = replayed.len() == read.rows.len() && summary.rows == read.rows.len();
                 (if whole { 0 } else { 101 }, "replayed".to_owned())
             }

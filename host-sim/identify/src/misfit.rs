@@ -181,7 +181,7 @@ mod tests {
         let table = Table::check(&made.table.image).unwrap();
         let said = |posture: f64| {
             let rows = read("b.csv", log(posture).as_bytes(), &ColumnMap::default(), &table, 20.0, true).unwrap().rows;
-            replay(&table, &rows).1.remarks.join("\n")
+            replay(&table, &rows, None).1.remarks.join("\n")
         };
         assert!(!said(upright).contains("posture"), "{}", said(upright));
         let other = said(upright + 2.8);

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::{CalibrationError, INSIDE, MOST_ERROR_RAD, OF_95, check_ratio_of, on_zero_of};
+use crate::calibrate::{CalibrationError, INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
 use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment, quantile_of, white_noise,
@@ -291,8 +291,13 @@ pub(crate) fn by_core(table: &Table<'_>, rows: impl Iterator<Item = [f64; 3]>) -
     })
 }
 
-/// Runs the core over the rows, from a state it does not know.
-pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, ReplaySummary) {
+/// Runs the core over the rows, from a state it does not know. `wind_up` is what the calibration of the table says of
+/// torques, if there was one.
+pub fn replay(
+    table: &Table<'_>,
+    rows: &[MeasuredRow],
+    wind_up: Option<WindUpTorque>,
+) -> (Vec<ReplayedRow>, ReplaySummary) {
     let mut by_quality = [0; 4];
     let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
     let mut replayed: Vec<ReplayedRow> = rows
@@ -321,7 +326,7 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             }
         })
         .collect();
-    read_torques(table, &mut replayed);
+    read_torques(table, &mut replayed, wind_up);
     let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
     let count = replayed.len().max(1) as f64;
     let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
@@ -352,17 +357,20 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
 }
 
 /// Puts in the torques that the wind-up says, the mean residual taken for the zero of the output. The intervals are of
-/// what the table leaves of the rows; without a torque, of the noise of the rows and of what the table leaves of its
-/// samples.
-fn read_torques(table: &Table<'_>, rows: &mut [ReplayedRow]) {
+/// what the calibration left of rows that it did not see. Without one they are of what the table leaves of the rows;
+/// without a torque, of the noise of the rows and of what the table leaves of its samples.
+fn read_torques(table: &Table<'_>, rows: &mut [ReplayedRow], calibrated: Option<WindUpTorque>) {
     let zero = rows.iter().map(|row| row.residual_arcsec).sum::<f64>() / rows.len().max(1) as f64;
-    let half_width_arcsec = if rows.iter().any(|row| row.torque_n_m != 0.0) {
+    let half_width_arcsec = if let Some(calibrated) = &calibrated {
+        calibrated.half_width_arcsec
+    } else if rows.iter().any(|row| row.torque_n_m != 0.0) {
         quantile_of(&mut rows.iter().map(|row| (row.residual_arcsec - zero).abs()).collect::<Vec<f64>>(), INSIDE)
     } else {
         let errors: Vec<f64> = rows.iter().map(|row| row.measured_arcsec).collect();
         OF_95 * white_noise([&errors[..]]).hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)
     };
-    let mut wind_up = WindUpCurve::new(table, PlayState::unknown());
+    let hysteresis = calibrated.and_then(|calibrated| calibrated.hysteresis).unwrap_or_default();
+    let mut wind_up = WindUpCurve::new(table, PlayState::unknown()).with(hysteresis);
     for row in rows {
         let [error, half_width] = [row.measured_arcsec - zero, half_width_arcsec].map(|arcsec| arcsec / ARCSEC_PER_RAD);
         let torque = wind_up.read(row.generator_rad, error, row.temperature_c, half_width);

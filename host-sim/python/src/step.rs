@@ -396,7 +396,7 @@ impl Table {
         RowsRead { rows, faults, notes }: RowsRead,
         rows_of: Option<RowsOf>,
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
-        let (replayed, mut summary) = py.detach(|| replay(self.table(), &rows));
+        let (replayed, mut summary) = py.detach(|| replay(self.table(), &rows, None));
         (summary.data_faults, summary.notes) = (faults, notes);
         summary.of_rows(rows_of, self.table());
         let columns = PyDict::new(py);

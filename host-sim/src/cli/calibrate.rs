@@ -382,7 +382,7 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let _ = writeln!(text, "{}", held(c));
-    if let Some(torque) = c.torque_from_wind_up {
+    if let Some(torque) = &c.torque_from_wind_up {
         let _ = writeln!(
             text,
             "torque from the wind-up, where nothing was fitted: {:.2} N.m rms off that recorded, {:+.2} in the mean, \

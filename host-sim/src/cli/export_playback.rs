@@ -165,7 +165,7 @@ impl PlaybackOptions {
         curve: Option<&Curve>,
     ) -> Result<(PlaybackResidual, Vec<String>), Failure> {
         let RowsRead { rows, faults, notes } = measured(data, &self.logs, section.table, section.temperature_c, false)?;
-        let (replayed, summary) = replay(section.table, &rows);
+        let (replayed, summary) = replay(section.table, &rows, None);
         let faults = faults.into_iter().map(|fault| fault.what);
         let mut notes: Vec<String> = faults.chain(notes).chain(summary.remarks).collect();
         let extrapolated = summary.rows_by_quality[2];

@@ -1,22 +1,35 @@
-//! How good a torque from the wind-up would be: in rows that took no part in the fit.
+//! How good a torque from the wind-up would be: in rows that took no part in the fit. With a hysteresis by load where
+//! torques are better with it.
 
-use serde::Serialize;
+use std::path::Path;
+
+use flexspline::Table;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::folds::{Folds, Row};
 use super::parts::State;
 use super::prior::Prior;
 use super::rows::{FoldKind, Rows};
-use super::{Model, ROWS_OF_A_WIDTH};
+use super::{LEAST_GAIN, Model};
+use crate::linear::{self, Gram, solve};
 use crate::measurement::quantile_of;
-use crate::wind_up::load_of;
+use crate::wind_up::{HeldTorques, Hysteresis, load_of};
 use flexspline_base::robust::rms;
 use flexspline_base::statistics::mean;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::SlipSpring;
 
 /// Share of the rows whose interval is to hold their torque, by definition.
 pub(crate) const INSIDE: f64 = 0.95;
+/// Torques at which springs slip, of the largest recorded: each twice the one before, up to half, as a loop of a spring
+/// that slips later is not closed. *Guess*.
+const SLIPS: [f64; 5] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
+/// What a spring holds at most before rows say anything, arcsec: far beyond any, so that rows decide. *Guess*.
+const ANY_ARCSEC: f64 = 1e4;
 
 /// Torque from the wind-up against that recorded, rows in steady motion, each by a fit without its fold.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WindUpTorque {
     /// Difference, N·m rms.
     pub rms_n_m: f64,
@@ -28,17 +41,89 @@ pub struct WindUpTorque {
     pub rows: usize,
     /// Half width of the error that the intervals are of, arcsec: where 95 of 100 rows of the other folds lie.
     pub half_width_arcsec: f64,
+    /// Hysteresis that the torques are read with, if they are better with one: no table holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hysteresis: Option<Hysteresis>,
 }
 
-/// A row that was left out of a fit.
-struct LeftOut<'a> {
-    row: &'a Row,
-    model: &'a Model,
-    /// What the fit leaves of it, arcsec.
-    left_arcsec: f64,
+/// A number for each spring.
+type Held = [f64; SLIPS.len()];
+
+/// A fit to all folds but one.
+struct Fit {
+    /// Of the output in each log.
+    zeros: Vec<f64>,
+    model: Model,
+    hysteresis: Hysteresis,
+}
+
+/// What springs hold in each row by the torque recorded, over what each can.
+fn held_by(rows: &[Row], widths_n_m: Held) -> Vec<Held> {
+    let (mut held, mut log) = (HeldTorques::default(), 0);
+    let of_row = |row: &Row| {
+        if row.at.log != log {
+            (held, log) = (HeldTorques::default(), row.at.log);
+        }
+        held.follow(row.at.torque_n_m, widths_n_m);
+        std::array::from_fn(|k| held.by_spring[k] / widths_n_m[k])
+    };
+    rows.iter().map(of_row).collect()
+}
+
+/// Hysteresis in what a model leaves of the rows of some folds, each log with a zero of its own. The output lags: a
+/// spring with which it would lead is left out.
+fn hysteresis_in(
+    rows: &[Row],
+    held: &[Held],
+    widths_n_m: Held,
+    left_arcsec: impl Fn(&Row) -> Option<f64>,
+) -> Option<Hysteresis> {
+    let logs = rows.iter().map(|row| row.at.log + 1).max()?;
+    let most_n_m = widths_n_m[SLIPS.len() - 1] / SLIPS[SLIPS.len() - 1];
+    let mut gram = Gram::none(logs + SLIPS.len() + 2);
+    let mut x = vec![0.0; gram.size];
+    for (row, held) in rows.iter().zip(held) {
+        let Some(left) = left_arcsec(row) else { continue };
+        x.fill(0.0);
+        x[row.at.log] = 1.0;
+        x[logs] = row.at.torque_n_m / most_n_m;
+        x[logs + 1..][..SLIPS.len()].copy_from_slice(held);
+        x[logs + 1 + SLIPS.len()] = left;
+        gram.add_row(&x, 1.0);
+    }
+    let gram = gram.among(&(0..gram.size).collect::<Vec<usize>>());
+    let mut priors = vec![linear::Prior { mean: 0.0, std: ANY_ARCSEC }; gram.size - 1];
+    loop {
+        let found = solve(&gram, &priors, 1.0)?.coefficients;
+        let leads = (logs + 1..found.len()).filter(|k| priors[*k].std > 0.0 && found[*k] > 0.0);
+        match leads.max_by(|a, b| found[*a].total_cmp(&found[*b])) {
+            Some(leads) => priors[leads].std = 0.0,
+            None => {
+                let by = |arcsec: f64, n_m: f64| arcsec / ARCSEC_PER_RAD / n_m;
+                let springs = widths_n_m.iter().zip(&found[logs + 1..]);
+                let spring = |(width_n_m, arcsec): (&f64, &f64)| SlipSpring {
+                    width_n_m: *width_n_m,
+                    gain_rad_per_n_m: by(*arcsec, *width_n_m),
+                };
+                return Some(Hysteresis {
+                    gain_rad_per_n_m: by(found[logs], most_n_m),
+                    springs: springs.map(spring).collect(),
+                });
+            }
+        }
+    }
 }
 
 impl WindUpTorque {
+    /// Of `calibration.json` in the folder of a table, if that is of this table.
+    #[must_use]
+    pub fn beside(file: &Path, table: &Table<'_>) -> Option<Self> {
+        let text = std::fs::read_to_string(file.with_file_name("calibration.json")).ok()?;
+        let mut calibration: Value = serde_json::from_str(&text).ok()?;
+        let is_of_table = calibration["table_id"] == table.id().to_string();
+        serde_json::from_value(calibration["torque_from_wind_up"].take()).ok().filter(|_| is_of_table)
+    }
+
     /// None where the output does not give way to the load.
     pub(super) fn of(rows: &Rows, folds: &Folds, model: &Model, prior: &Prior<'_>) -> Option<Self> {
         let range @ [low, high] = model.scales.torque_n_m;
@@ -46,49 +131,89 @@ impl WindUpTorque {
             return None;
         }
         let all = folds.all();
-        let fit_without = |fold: usize| {
-            let others: Vec<usize> = all.iter().copied().filter(|other| *other != fold).collect();
+        let widths_n_m = SLIPS.map(|share| share * low.abs().max(high.abs()));
+        let held = held_by(&rows.rows, widths_n_m);
+        let fit_without = |fold: Option<usize>, springs: bool| {
+            let others: Vec<usize> = all.iter().copied().filter(|other| Some(*other) != fold).collect();
             let mut zeros = folds.fit(&others, &model.chosen, &[])?;
             let coefficients = zeros.split_off(zeros.len() - model.coefficients.len());
-            Some((fold, zeros, Model { coefficients, ..model.clone() }))
-        };
-        let fits = all.iter().map(|fold| fit_without(*fold)).collect::<Option<Vec<_>>>()?;
-        let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
-        let mut left_out: Vec<LeftOut<'_>> = Vec::new();
-        for (fold, zeros, model) in &fits {
-            let of_fold = rows.rows.iter().step_by(every).filter(|row| row.fold == *fold);
+            let model = Model { coefficients, ..model.clone() };
             let left = |row: &Row| row.left_arcsec - model.adds_arcsec(&row.at);
-            // A log that was left out whole has its zero from nowhere else.
-            let own = |log: usize| mean(&of_fold.clone().filter(|row| row.at.log == log).map(left).collect::<Vec<_>>());
-            let zeros: Vec<f64> = match rows.folds {
-                FoldKind::Files => (0..rows.means_arcsec.len()).map(own).collect(),
-                FoldKind::Blocks => zeros.clone(),
+            let of_others = |row: &Row| (Some(row.fold) != fold).then(|| left(row));
+            let hysteresis = if springs {
+                hysteresis_in(&rows.rows, &held, widths_n_m, of_others)?
+            } else {
+                Hysteresis::default()
             };
-            let left_out_of = |row| LeftOut { row, model, left_arcsec: left(row) - zeros[row.at.log] };
-            left_out.extend(of_fold.clone().map(left_out_of));
+            Some(Fit { zeros, model, hysteresis })
+        };
+        let judged = |springs: bool| {
+            let fits = (0..=*all.last()?).map(|fold| fit_without(Some(fold), springs)).collect::<Option<Vec<_>>>()?;
+            Some(Self::judged(rows, &held, &fits, range, prior))
+        };
+        let [without, with] = [false, true].map(judged);
+        let gains = |with: &Self, without: &Self| with.rms_n_m.powi(2) < (1.0 - LEAST_GAIN) * without.rms_n_m.powi(2);
+        match (without?, with) {
+            (without, Some(with)) if gains(&with, &without) => {
+                let mut hysteresis = fit_without(None, true)?.hysteresis;
+                hysteresis.springs.retain(|spring| spring.gain_rad_per_n_m < 0.0);
+                Some(Self { hysteresis: Some(hysteresis), ..with })
+            }
+            (without, _) => Some(without),
+        }
+    }
+
+    /// Of fits, each without the fold of its place, in the order of the rows: springs go by the torques found.
+    fn judged(rows: &Rows, held: &[Held], fits: &[Fit], range: [f64; 2], prior: &Prior<'_>) -> Self {
+        // A log that was left out whole has its zero from nowhere else.
+        let own_zero = |log: usize| {
+            let of_log = rows.rows.iter().zip(held).filter(|(row, _)| row.at.log == log);
+            let left = of_log.map(|(row, held)| {
+                let Fit { model, hysteresis, .. } = &fits[row.fold];
+                let springs = hysteresis.springs.iter().zip(held);
+                let load = hysteresis.gain_rad_per_n_m * row.at.torque_n_m;
+                let of_load =
+                    springs.fold(load, |sum, (of, share)| sum + of.gain_rad_per_n_m * of.width_n_m * share);
+                row.left_arcsec - model.adds_arcsec(&row.at) - ARCSEC_PER_RAD * of_load
+            });
+            mean(&left.collect::<Vec<f64>>())
+        };
+        let zeros: Vec<f64> = match rows.folds {
+            FoldKind::Files => (0..rows.means_arcsec.len()).map(own_zero).collect(),
+            FoldKind::Blocks => Vec::new(),
+        };
+        let (mut off, mut left) = (Vec::new(), Vec::new());
+        let (mut now, mut log) = (HeldTorques::default(), 0);
+        for row in &rows.rows {
+            if row.at.log != log {
+                (now, log) = (HeldTorques::default(), row.at.log);
+            }
+            let fit = &fits[row.fold];
+            let says = |torque_n_m: f64| {
+                fit.model.says_arcsec(&State { torque_n_m, ..row.at }, prior)
+                    + ARCSEC_PER_RAD * fit.hysteresis.error_rad(&now, torque_n_m)
+            };
+            let zero = zeros.get(log).unwrap_or(&fit.zeros[log]);
+            let error = prior.steady_arcsec(&row.at) + row.left_arcsec - zero;
+            let torque = load_of(says, range, error);
+            off.push(torque - row.at.torque_n_m);
+            left.push((row.fold, (error - says(row.at.torque_n_m)).abs()));
+            now.follow(torque, fit.hysteresis.springs.iter().map(|spring| spring.width_n_m));
         }
         let half_width = |fold: usize| {
-            let others = left_out.iter().filter(|left| left.row.fold != fold);
-            quantile_of(&mut others.map(|left| left.left_arcsec.abs()).collect::<Vec<f64>>(), INSIDE)
+            let others = left.iter().filter(|(other, _)| *other != fold);
+            quantile_of(&mut others.map(|(_, left)| *left).collect::<Vec<f64>>(), INSIDE)
         };
-        let half_widths: Vec<(usize, f64)> = all.iter().map(|fold| (*fold, half_width(*fold))).collect();
-        let (mut off, mut inside) = (Vec::new(), 0.0);
-        for (fold, half_width) in &half_widths {
-            for LeftOut { row, model, left_arcsec } in left_out.iter().filter(|left| left.row.fold == *fold) {
-                let says = |torque_n_m: f64| model.says_arcsec(&State { torque_n_m, ..row.at }, prior);
-                let recorded = row.at.torque_n_m;
-                let error = says(recorded) + left_arcsec;
-                off.push(load_of(says, range, error) - recorded);
-                let [least, most] = [-half_width, *half_width].map(|by| load_of(says, range, error + by));
-                inside += f64::from((least..=most).contains(&recorded));
-            }
-        }
-        Some(WindUpTorque {
+        let half_widths: Vec<f64> = (0..fits.len()).map(half_width).collect();
+        // The error rises with the torque: one is inside its interval where the other is.
+        let inside = left.iter().filter(|(fold, left)| *left <= half_widths[*fold]).count();
+        Self {
             rms_n_m: rms(&off),
             bias_n_m: mean(&off),
-            inside: inside / off.len().max(1) as f64,
+            inside: inside as f64 / off.len().max(1) as f64,
             rows: off.len(),
-            half_width_arcsec: mean(&half_widths.iter().map(|(_, half_width)| *half_width).collect::<Vec<f64>>()),
-        })
+            half_width_arcsec: mean(&half_widths),
+            hysteresis: None,
+        }
     }
 }
