@@ -341,7 +341,7 @@ fn remarks(plan: &VariantPlan, sweep: &ReducedSweep) -> Vec<String> {
         (runs(&|row| row.meets && !row.cautions.is_empty()), "runs that meet the constraints have a caution"),
         (
             runs(&|row| Judge::is_preloaded(plan, row)),
-            "runs have a backlash below zero: their teeth are preloaded, or did not settle; they are not among the best",
+            "runs have a backlash below zero: teeth that are preloaded, or did not settle; none is among the best",
         ),
         (
             sum(|of| of.beyond_kernels),

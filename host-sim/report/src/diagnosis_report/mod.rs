@@ -1,9 +1,9 @@
 //! The page of a diagnosis: what an analyst with a log file sees.
 //!
 //! The answer first, in one sentence and one number; then the causes, the picture and what to record next; the rest is
-//! folded: the gain, the pictures of orders and over time, the data. Residuals come row by row in three levels (nominal,
-//! recalibrated, with the causes), and a selector shows the picture of each: the last is without what the causes
-//! explain.
+//! folded: the gain, the pictures of orders and over time, the data. Residuals come row by row in three levels
+//! (nominal, recalibrated, with the causes), and a selector shows the picture of each: the last is without what the
+//! causes explain.
 
 mod orders;
 mod picture;
