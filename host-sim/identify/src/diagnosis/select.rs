@@ -530,8 +530,6 @@ pub(crate) struct Chooser<'c, 'a, 'l> {
     pub scope: Scope,
     /// Every decision.
     pub trace: &'c mut Trace,
-    /// What has given way, and to what: once come back it does not give way to the same again, so rounds end.
-    pub given: HashSet<(u64, u64)>,
 }
 
 impl<'l> Chooser<'_, '_, 'l> {
@@ -557,7 +555,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             }
             let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
             causes.sort_unstable();
-            if !seen.insert((causes.join("+"), self.given.len())) {
+            if !seen.insert(causes.join("+")) {
                 break;
             }
         }
@@ -688,7 +686,6 @@ impl<'l> Chooser<'_, '_, 'l> {
             let may = |law: &&'l Law| {
                 selected.terms.iter().all(|t| t.law.label != law.label)
                     && tolerance(problem, &without.fit, law).is_none_or(|judged| judged.passed)
-                    && !self.given.contains(&(held.law.id(), law.id()))
             };
             let open: Vec<&Law> = self.laws.iter().filter(may).collect();
             let scaffold = Scaffold::new(problem, &without.terms);
@@ -745,7 +742,6 @@ impl<'l> Chooser<'_, '_, 'l> {
             if taken {
                 let gates = vec![Judged { passed: false, ..Judged::above(Gate::First, 0.0, ahead_by) }];
                 self.trace.judged(Stage::Exchange, held.law, &held.places, Some(law.label), gates);
-                self.given.insert((held.law.id(), law.id()));
                 return self.backward(exchanged);
             }
         }
