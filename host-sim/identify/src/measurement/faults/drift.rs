@@ -58,9 +58,6 @@ const LEAST_LEAP_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
 const LEAP_S: f64 = 2.0;
 /// Share of the drift that a leap has at least. *Guess*: no drift makes a third of its way in seconds.
 const LEAP_SHARE: f64 = 0.3;
-/// Nor does it drift if it leaps between two recordings by more than this multiple of what the drift gives in that
-/// time. *Guess*: where a bench rests the drift is slower or faster, but rarely by more.
-const GAP_SHARE: f64 = 2.0;
 /// Rows of which the median is a level. *Guess*: it has a third of the noise of a row.
 const LEVEL_ROWS: usize = 12;
 
@@ -127,9 +124,7 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
         return None;
     }
     // Teeth that slip have a trend, too.
-    let per_s = 2.0 / (end - begin);
-    let leap = largest_leap(sessions).max(largest_leap_between(sessions, drift.abs() * per_s));
-    if leap > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
+    if largest_leap(sessions) > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
         return None;
     }
     // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then
@@ -152,6 +147,7 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
     if (2..=MOST_ZEROS).contains(&lefts.len()) && !goes_on_within(&state, &all, place, drift, &lefts) {
         return None;
     }
+    let per_s = 2.0 / (end - begin);
     let (trend, std) = line(&of_stretches(&lefts))?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
     certain.then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
@@ -219,18 +215,6 @@ fn largest_leap(sessions: &[Session]) -> f64 {
         }
     }
     largest
-}
-
-/// The largest change from one session to the next, rad, beyond [`GAP_SHARE`] times a drift of `per_s` rad/s.
-fn largest_leap_between(sessions: &[Session], per_s: f64) -> f64 {
-    let leap = |pair: &[Session]| {
-        let [before, after] = pair else { return 0.0 };
-        let (Some(then), Some(now)) = (&before.time_s, &after.time_s) else { return 0.0 };
-        let passed = now.first().zip(then.last()).map_or(0.0, |(now, then)| now - then);
-        let last = error_from(before, before.len().saturating_sub(LEVEL_ROWS));
-        (error_from(after, 0) - last).abs() - GAP_SHARE * per_s * passed
-    };
-    sessions.windows(2).map(leap).fold(0.0, f64::max)
 }
 
 /// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
