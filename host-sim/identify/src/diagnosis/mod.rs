@@ -47,8 +47,6 @@ mod verdict;
 mod with_speed;
 mod zeros;
 
-use std::collections::HashSet;
-
 use flexspline::Table;
 use thiserror::Error;
 
@@ -318,7 +316,7 @@ fn choose<'l>(
     (bests, scope, trace): (&mut Bests, Scope, &mut Trace),
 ) -> Result<Selected<'l>, DiagnosisError> {
     let least = select::least_size(problem.fineness.noise.white);
-    let chooser = Chooser { problem, laws, least, bests, scope, trace, given: HashSet::new() };
+    let chooser = Chooser { problem, laws, least, bests, scope, trace };
     let selected = chooser.select(terms_at(problem, laws, start)).ok_or(DiagnosisError::NotFinite)?;
     *start = remembered(laws, &selected.terms);
     Ok(selected)

@@ -16,11 +16,6 @@ use crate::linear::Solution;
 
 /// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are exchanged.
 const MOST_ROUNDS: usize = 10;
-/// Number of the best candidates that are refitted jointly, … *Guess*: it bounds the time.
-const CONTENDERS: usize = 3;
-/// … those whose gain is at least this share of what the best gains. *Guess*: what others have taken of a candidate is
-/// no more than that.
-const CONTENDS: f64 = 0.6;
 /// Models that are refined in each round. *Guess*: it bounds the time; the right one is among the first few.
 const REFINED: usize = 9;
 /// Best starting points that are kept each time that a model is tried. *Guess*: the second one for a wheel that has two
@@ -535,8 +530,6 @@ pub(crate) struct Chooser<'c, 'a, 'l> {
     pub scope: Scope,
     /// Every decision.
     pub trace: &'c mut Trace,
-    /// What has given way, and to what: once come back it does not give way to the same again, so rounds end.
-    pub given: HashSet<(u64, u64)>,
 }
 
 impl<'l> Chooser<'_, '_, 'l> {
@@ -562,7 +555,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             }
             let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
             causes.sort_unstable();
-            if !seen.insert((causes.join("+"), self.given.len())) {
+            if !seen.insert(causes.join("+")) {
                 break;
             }
         }
@@ -630,7 +623,6 @@ impl<'l> Chooser<'_, '_, 'l> {
         for (_, next) in grown.iter().filter(|(gain, _)| everything && *gain > CLOSE_GAIN) {
             self.bests.came_close(next.newest());
         }
-        contenders_settled(problem, &mut grown, before);
         // Something with a name goes before something without unless that is clearly better.
         let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
         let best_named = best_named.map(|(_, next)| next.newest().law);
@@ -694,7 +686,6 @@ impl<'l> Chooser<'_, '_, 'l> {
             let may = |law: &&'l Law| {
                 selected.terms.iter().all(|t| t.law.label != law.label)
                     && tolerance(problem, &without.fit, law).is_none_or(|judged| judged.passed)
-                    && !self.given.contains(&(held.law.id(), law.id()))
             };
             let open: Vec<&Law> = self.laws.iter().filter(may).collect();
             let scaffold = Scaffold::new(problem, &without.terms);
@@ -751,29 +742,9 @@ impl<'l> Chooser<'_, '_, 'l> {
             if taken {
                 let gates = vec![Judged { passed: false, ..Judged::above(Gate::First, 0.0, ahead_by) }];
                 self.trace.judged(Stage::Exchange, held.law, &held.places, Some(law.label), gates);
-                self.given.insert((held.law.id(), law.id()));
                 return self.backward(exchanged);
             }
         }
         self.backward(selected)
     }
-}
-
-/// The best by name of selections that have grown by a term, and those close to it, settle before they are compared:
-/// what they were refined with has taken some of what is there, which is not the same share of each. Gains are over
-/// `before`.
-fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [Grown<'l>], before: f64) {
-    let mut named: Vec<&mut Grown<'l>> = grown.iter_mut().filter(|(_, next)| next.newest().law.named()).collect();
-    named.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let least = named.first().map_or(f64::INFINITY, |(best, _)| (CONTENDS * best).max(LEAST_EVIDENCE));
-    named.truncate(CONTENDERS);
-    named.retain(|(gain, next)| *gain >= least && but(&next.terms, next.terms.len() - 1).any(|t| !t.places.is_empty()));
-    if named.len() < 2 {
-        return;
-    }
-    named.into_par_iter().with_max_len(1).for_each(|grown| {
-        if let Some(settled) = settle(problem, grown.1.clone()) {
-            *grown = (settled.evidence() - before, settled);
-        }
-    });
 }

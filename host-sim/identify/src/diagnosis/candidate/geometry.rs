@@ -15,8 +15,8 @@ use flexspline::FixedMember;
 
 use super::displaced::displaced;
 use super::{
-    Coefficients, Excitation, Law, Named, Regressor, Shape, Shaped, Simulated, Tag, Values, beside, by_row, kernel,
-    main, nuisance, of_both, of_wave, polar, times,
+    Coefficients, Excitation, Law, Named, Regressor, Shape, Simulated, Tag, Values, beside, by_row, kernel, main,
+    nuisance, of_both, of_wave, polar, times,
 };
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
@@ -162,38 +162,13 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
         }
         columns
     })
-    .parameters_by(pitch_parameters)
+    .parameters_by(|on, _, c| wave_parameters(on, c, 2.0))
     .physical_if(|_, c| {
         let (taken, light) = (c.of(TAKEN), c.of(TAKEN_UNDER_LIGHT_LOAD));
         taken.abs().max((taken + light).abs()) < MOST_CLEARANCE_TAKEN * of_wave(c, Tag::WAVE).0
     });
     law.search.whole_beside_noise = true;
     law.of_shape()
-}
-
-/// Pitch error of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a
-/// little of 1 and 4.
-fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
-    Law::new(cause, move |on, _| {
-        let (flank, light) = (&on.base.flank, light(on));
-        let light_by_flank = times(flank, &light);
-        let mut columns: Vec<Regressor> = Vec::new();
-        columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(Tag::WAVE)));
-        columns.extend(waves(on, of, 4.0).map(|v| nuisance(v, 0.25)));
-        columns.extend(weighted_waves(on, of, 1.0, &light).map(|v| nuisance(v, 0.2)));
-        // The clearance makes even orders of the first one, of other phase on each flank.
-        columns.extend(weighted_waves(on, of, 2.0, &light_by_flank).map(|v| nuisance(v, 0.4)));
-        columns.extend(weighted_waves(on, of, 2.0, &light).map(|v| nuisance(v, 0.1)));
-        columns.push(nuisance(light_by_flank.clone(), 0.3));
-        columns
-    })
-    .parameters_by(pitch_parameters)
-    .variant("smooth")
-    .of_shape()
-}
-
-fn pitch_parameters(on: &Excitation<'_>, _: Shaped<'_>, c: Coefficients<'_>) -> Vec<Named> {
-    wave_parameters(on, c, 2.0)
 }
 
 /// Of a wave of n periods in a turn of the wheel.
@@ -219,10 +194,7 @@ fn pitch_errors(cause: CauseName, wheel: Wheel, on: &Excitation<'_>) -> Vec<Law>
     let of = Angle::from(wheel);
     let of_encoder = |harmonic: f64| is_standing(on.nominal, of) && super::sensor::is_subdivision(harmonic);
     let higher = HIGHER_HARMONICS.into_iter().filter(|harmonic| !of_encoder(*harmonic));
-    [pitch(cause, of), smooth_pitch(cause, of)]
-        .into_iter()
-        .chain(higher.map(|harmonic| higher_harmonic(cause, of, harmonic)))
-        .collect()
+    std::iter::once(pitch(cause, of)).chain(higher.map(|harmonic| higher_harmonic(cause, of, harmonic))).collect()
 }
 
 /// The model of a wheel off its place: the one by the kernels of the drive, where it has them.

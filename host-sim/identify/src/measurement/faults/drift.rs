@@ -10,8 +10,7 @@ use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
-use flexspline_base::robust::{least_and_most, median_of};
-use flexspline_base::statistics::correlation;
+use flexspline_base::robust::median_of;
 
 /// Drift of less than this over the whole recording is not looked for, rad. *Guess*: below what most causes do, and
 /// raised from 3 arcsec.
@@ -47,13 +46,8 @@ const ALIKE: f64 = 0.35;
 /// A trend may be one of position, load and temperature if considering them multiplies its standard deviation by more
 /// than this. *Guess*: then they hold 15/16 of the information.
 const CONFUSED: f64 = 4.0;
-/// It is none of them from this number of standard deviations on, if the temperature does not go with time. *Guess*:
-/// ten times what separates causes.
+/// It is none of them from this number of standard deviations on. *Guess*: ten times what separates causes.
 const BEYOND_CONFUSION: f64 = 50.0;
-/// The temperature goes with time from this correlation on… *Guess*: nearly two thirds of its variance.
-const WITH_TIME: f64 = 0.8;
-/// …if it spans this much, K. *Guess*: within it a bench is at one temperature.
-const COUNTS_K: f64 = 2.0;
 /// Share of rows that each flank must have. *Guess*: fewer rows do not say how it moves there.
 const BOTH_FLANKS: f64 = 0.1;
 
@@ -64,9 +58,6 @@ const LEAST_LEAP_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
 const LEAP_S: f64 = 2.0;
 /// Share of the drift that a leap has at least. *Guess*: no drift makes a third of its way in seconds.
 const LEAP_SHARE: f64 = 0.3;
-/// Nor does it drift if it leaps between two recordings by more than this multiple of what the drift gives in that
-/// time. *Guess*: where a bench rests the drift is slower or faster, but rarely by more.
-const GAP_SHARE: f64 = 2.0;
 /// Rows of which the median is a level. *Guess*: it has a third of the noise of a row.
 const LEVEL_ROWS: usize = 12;
 
@@ -133,15 +124,13 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
         return None;
     }
     // Teeth that slip have a trend, too.
-    let per_s = 2.0 / (end - begin);
-    let leap = largest_leap(sessions).max(largest_leap_between(sessions, drift.abs() * per_s));
-    if leap > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
+    if largest_leap(sessions) > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
         return None;
     }
-    // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then it must
-    // not warm with time, and the sessions have to say it with one voice.
+    // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then
+    // the sessions have to say it with one voice.
     let confused = formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std;
-    if confused && (warms_with_time(sessions, &tau) || drift.abs() < BEYOND_CONFUSION * formal) {
+    if confused && drift.abs() < BEYOND_CONFUSION * formal {
         return None;
     }
     // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain.
@@ -158,19 +147,10 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
     if (2..=MOST_ZEROS).contains(&lefts.len()) && !goes_on_within(&state, &all, place, drift, &lefts) {
         return None;
     }
+    let per_s = 2.0 / (end - begin);
     let (trend, std) = line(&of_stretches(&lefts))?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
     certain.then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
-}
-
-/// Whether the temperature changes by what counts, and goes with time: then what bends with it looks like a drift.
-fn warms_with_time(sessions: &[Session], tau: Extra) -> bool {
-    let (times, temperatures): (Vec<f64>, Vec<f64>) = (sessions.iter().enumerate())
-        .filter_map(|(s, session)| Some((s, session.temperature_c.as_ref()?)))
-        .flat_map(|(s, values)| values.iter().enumerate().map(move |(row, value)| (tau(s, row), *value)))
-        .unzip();
-    let (low, high) = least_and_most(temperatures.iter().copied());
-    high - low > COUNTS_K && correlation(&times, &temperatures).is_some_and(|with| with.abs() > WITH_TIME)
 }
 
 /// A time in units of the recording, from -1 to 1, and what is left of the error there, rad.
@@ -237,18 +217,6 @@ fn largest_leap(sessions: &[Session]) -> f64 {
     largest
 }
 
-/// The largest change from one session to the next, rad, beyond [`GAP_SHARE`] times a drift of `per_s` rad/s.
-fn largest_leap_between(sessions: &[Session], per_s: f64) -> f64 {
-    let leap = |pair: &[Session]| {
-        let [before, after] = pair else { return 0.0 };
-        let (Some(then), Some(now)) = (&before.time_s, &after.time_s) else { return 0.0 };
-        let passed = now.first().zip(then.last()).map_or(0.0, |(now, then)| now - then);
-        let last = error_from(before, before.len().saturating_sub(LEVEL_ROWS));
-        (error_from(after, 0) - last).abs() - GAP_SHARE * per_s * passed
-    };
-    sessions.windows(2).map(leap).fold(0.0, f64::max)
-}
-
 /// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
 fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     if points.len() < FEWEST_STRETCHES {
@@ -296,21 +264,6 @@ mod tests {
             }
         };
         zeros.iter().enumerate().map(one).collect()
-    }
-
-    #[test]
-    fn a_temperature_goes_with_time_by_its_span_and_its_trend() {
-        let warmed = |by_k: f64, late: f64| {
-            let mut sessions = sessions(0.0, &[0.0; 3]);
-            for (number, session) in sessions.iter_mut().enumerate() {
-                session.temperature_c = Some(vec![20.0 + by_k * (number as f64 - late).abs(); session.len()]);
-            }
-            let tau = |s: usize, _: usize| s as f64 - 1.0;
-            warms_with_time(&sessions, &tau)
-        };
-        assert!(warmed(4.0, 0.0));
-        assert!(!warmed(0.5, 0.0), "within what counts");
-        assert!(!warmed(4.0, 1.0), "cold again at the end");
     }
 
     #[test]

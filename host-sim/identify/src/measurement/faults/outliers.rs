@@ -35,9 +35,6 @@ const LARGE_RAD: f64 = 120.0 * ARCSEC;
 /// A load that changes by this share of its largest within the neighbouring rows moves the drive: the backlash is
 /// crossed, wind-up follows. *Guess*: the order of magnitude of friction.
 const SWINGS: f64 = 0.05;
-/// A speed that changes by this share of the fastest within the neighbouring rows makes a torque of its own. *Guess*:
-/// steady motion is evener.
-const GAINS: f64 = 0.1;
 /// Rows before and after that are looked at. *Guess*: the least number of which a median rejects one.
 const AROUND_ONE: usize = 3;
 /// Rows around, for what is usual there. *Guess*: 30 rows in all, of which few are out.
@@ -94,15 +91,6 @@ fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
         .torque_n_m
         .as_ref()
         .is_some_and(|torque| strikes(torque, row, largest_n_m) || out_by(torque, row).abs() > SWINGS * largest_n_m)
-}
-
-/// Whether a torque that stands out for a row may be the drive's own: the teeth strike, or the generator gains or loses
-/// speed, and masses push back.
-fn may_be_felt(session: &Session, row: usize, largest_n_m: f64, fastest_rad: f64) -> bool {
-    let Some(torque) = session.torque_n_m.as_deref() else { return false };
-    let near = &session.generator_rad[row.saturating_sub(AROUND_ONE)..(row + AROUND_ONE + 1).min(torque.len())];
-    let (slow, fast) = least_and_most(near.windows(2).map(|at| at[1] - at[0]));
-    strikes(torque, row, largest_n_m) || fast - slow > GAINS * fastest_rad
 }
 
 /// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.
@@ -282,17 +270,10 @@ fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings)
     }
     let of = |session: &Session| rows_out(session.column(channel).unwrap_or_default(), least, 1);
     let found: Vec<Vec<Out>> = sessions.iter().map(of).collect();
-    // What the drive may have felt is no sign of a fault; where there is one, it is mended with the rest.
-    let (largest_n_m, fastest_rad) = (largest_torque(sessions), fastest(sessions));
-    let is_felt = |session: &Session, row: usize| {
-        channel == Quantity::Torque && may_be_felt(session, row, largest_n_m, fastest_rad)
-    };
-    let out = sessions.iter().zip(&found).flat_map(|(session, found)| found.iter().map(move |out| (session, out)));
-    let signs: Vec<f64> =
-        out.filter(|(session, (row, _))| !is_felt(session, *row)).map(|(_, (_, by))| by.abs()).collect();
-    let large = signs.iter().any(|by| *by > LARGE_OF_RANGE * range);
-    let too_many = count(&found) as f64 > SHARE * rows_of(sessions) as f64;
-    if signs.is_empty() || too_many || (signs.len() < FEW && !large) {
+    let number = count(&found);
+    let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_OF_RANGE * range);
+    let too_many = number as f64 > SHARE * rows_of(sessions) as f64;
+    if number == 0 || too_many || (number < FEW && !large) {
         return;
     }
     report(sessions, &found, channel, Treatment::Repaired, "the rows beside stand in", findings);
@@ -301,12 +282,6 @@ fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings)
             found.iter().for_each(|(row, _)| values[*row] = 0.5 * (values[row - 1] + values[row + 1]));
         }
     }
-}
-
-/// Largest move of the generator in a row, rad.
-fn fastest(sessions: &[Session]) -> f64 {
-    let moves = sessions.iter().flat_map(|session| session.generator_rad.windows(2).map(|at| (at[1] - at[0]).abs()));
-    moves.fold(0.0, f64::max)
 }
 
 /// Reports rows of a channel that are out, and what was done with them.
@@ -407,25 +382,6 @@ mod tests {
         assert_eq!(found(&load), [10]);
         load[30] -= 20.0;
         assert_eq!(found(&load), [10, 30]);
-    }
-
-    #[test]
-    fn a_torque_that_stands_out_may_be_a_blow_or_an_inertia_and_is_no_fault_then() {
-        let felt = |torque: [f64; 7], moves: f64| {
-            let angle = |k: i32| 0.05 * f64::from(k) + moves * f64::from(k).powi(2);
-            let generator_rad = (0..7).map(angle).collect();
-            let session = Session { generator_rad, torque_n_m: Some(torque.to_vec()), ..Session::default() };
-            may_be_felt(&session, 3, 40.0, 0.2)
-        };
-        let (rattles, without_load, held) = (
-            [-5.4, -4.7, -2.5, 18.3, -1.7, 9.0, 0.3],
-            [0.1, -0.2, 0.1, 18.3, -0.1, 0.2, 0.0],
-            [26.1, 27.0, 26.4, 44.3, 26.9, 27.3, 26.2],
-        );
-        assert!(felt(rattles, 0.0), "it crosses the clearance and rattles");
-        assert!(!felt(without_load, 0.0), "nothing moves a drive without load");
-        assert!(!felt(held, 0.0), "nor one whose flank is held at a steady pace");
-        assert!(felt(held, 0.01), "masses push back");
     }
 
     #[test]
