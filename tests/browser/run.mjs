@@ -772,12 +772,6 @@ await check("a link opens its generator at its figure", async () => {
     assert(broken === sessions - 1, `${broken} breaks for ${sessions} sessions`);
     return `${text.length - 1} rows`;
   });
-  await check("orders of the causes are marked", () => {
-    const { uprights } = report.figures["orders-output"].charts.nominal;
-    const mine = uprights.filter((u) => u.name.startsWith("eccentricity of the output encoder: "));
-    assert(mine.length === 1, JSON.stringify(uprights));
-    near(mine[0].x, 1, 1e-9, "once in an output turn");
-  });
   await check("a diagnosis prints", async () => {
     const pdf = await page.pdf({ format: "A4", path: path.join(shots, "diagnosis.pdf") });
     const pages = (pdf.toString("latin1").match(/\/Type\s*\/Page[^s]/g) ?? []).length;

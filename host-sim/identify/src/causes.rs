@@ -1,7 +1,7 @@
 //! The causes of the library.
 //!
 //! A [`CauseName`] is the name of a cause. All else that there is of it is one value, its `CauseSpec`, next to its law
-//! in a file of `crate::diagnosis::candidate`: words, needs, orders, parameters, place in a table and in a drive, the
+//! in a file of `crate::diagnosis::candidate`: words, needs, parameters, place in a table and in a drive, the
 //! laws that the diagnosis fits, and the one that [`crate::synthesize`] hides. The list below has a line for each.
 
 mod parameter;
@@ -191,34 +191,6 @@ impl Need {
     }
 }
 
-/// The turn that an order is counted in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
-    /// The wave on the flexspline.
-    Flexspline,
-    /// The wave on the circular spline.
-    CircularSpline,
-    /// The wave on the wheel that the parameter `wheel` names.
-    OfWheel,
-    /// The generator.
-    Generator,
-    /// The output.
-    Output,
-    /// Generator or output, as the parameter `encoder` says.
-    OfEncoder,
-}
-
-/// How often a wave comes in a turn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Multiple {
-    /// This number of times.
-    Fixed(f64),
-    /// As the parameter `harmonic` says; without it once and twice.
-    Harmonic,
-    /// As often as the flexspline has teeth.
-    ToothMesh,
-}
-
 /// Whether a table can hold a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum InTable {
@@ -285,12 +257,6 @@ impl CauseName {
     #[must_use]
     pub fn does(self) -> &'static str {
         self.spec().does
-    }
-
-    /// The orders that it makes, each counted against a turn: for marks in spectra.
-    #[must_use]
-    pub fn orders(self) -> &'static [(Turn, Multiple)] {
-        self.spec().orders
     }
 
     /// The reason why no table holds it, whatever the drive; nothing where a table can.

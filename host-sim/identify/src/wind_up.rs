@@ -34,7 +34,11 @@ pub(crate) fn load_of(error: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2],
         if off.abs() < same {
             return load;
         }
-        if off < 0.0 { (low, below) = (load, off) } else { (high, above) = (load, off) }
+        if off < 0.0 {
+            (low, below) = (load, off)
+        } else {
+            (high, above) = (load, off)
+        }
         if high - low < near {
             break;
         }
@@ -115,7 +119,8 @@ impl<'t> WindUpCurve<'t> {
             let error = self.table.steady_error_rad(generator, torque_n_m as f32, temperature_c as f32, way);
             error.map_or(f64::NAN, f64::from)
         };
-        let [forward, backward] = [Direction::Forward, Direction::Backward].map(|way| steady(self.held.torque_n_m, way));
+        let [forward, backward] =
+            [Direction::Forward, Direction::Backward].map(|way| steady(self.held.torque_n_m, way));
         if !(error_rad + forward + backward + half_width_rad).is_finite() {
             return [f64::NAN; 3];
         }

@@ -140,11 +140,8 @@ impl WindUpTorque {
             let model = Model { coefficients, ..model.clone() };
             let left = |row: &Row| row.left_arcsec - model.adds_arcsec(&row.at);
             let of_others = |row: &Row| (Some(row.fold) != fold).then(|| left(row));
-            let hysteresis = if springs {
-                hysteresis_in(&rows.rows, &held, widths_n_m, of_others)?
-            } else {
-                Hysteresis::default()
-            };
+            let hysteresis =
+                if springs { hysteresis_in(&rows.rows, &held, widths_n_m, of_others)? } else { Hysteresis::default() };
             Some(Fit { zeros, model, hysteresis })
         };
         let judged = |springs: bool| {
@@ -172,8 +169,7 @@ impl WindUpTorque {
                 let Fit { model, hysteresis, .. } = &fits[row.fold];
                 let springs = hysteresis.springs.iter().zip(held);
                 let load = hysteresis.gain_rad_per_n_m * row.at.torque_n_m;
-                let of_load =
-                    springs.fold(load, |sum, (of, share)| sum + of.gain_rad_per_n_m * of.width_n_m * share);
+                let of_load = springs.fold(load, |sum, (of, share)| sum + of.gain_rad_per_n_m * of.width_n_m * share);
                 row.left_arcsec - model.adds_arcsec(&row.at) - ARCSEC_PER_RAD * of_load
             });
             mean(&left.collect::<Vec<f64>>())

@@ -1,7 +1,7 @@
 //! The properties of a cause. Each stands in one file with its law, and in one line of the list in [`super`].
 
 pub(crate) use super::parameter::{ARCSECONDS, ENCODERS, HALF_LOAD, HARMONIC, WHEELS, microns, phase};
-pub(crate) use super::{CauseName, Factor, InTable, Kin, Multiple, Need, ParameterSpec, TIME, Turn, Usual, number};
+pub(crate) use super::{CauseName, Factor, InTable, Kin, Need, ParameterSpec, TIME, Usual, number};
 
 use super::ParameterName as Name;
 use crate::diagnosis::candidate::{Excitation, Law, Simulated, Values};
@@ -19,8 +19,6 @@ pub(crate) struct CauseSpec {
     pub kin: Kin,
     /// The conditions that data have to meet before it is considered.
     pub needs: &'static [Need],
-    /// The orders that it makes, each counted against a turn: for marks in spectra.
-    pub orders: &'static [(Turn, Multiple)],
     /// Whether a table can hold it.
     pub in_table: InTable,
     /// Sets the fields of a drive file that hold it; nothing where none does.
@@ -49,7 +47,6 @@ pub(crate) const fn plain() -> CauseSpec {
         does: "",
         kin: Kin::Unlike,
         needs: &[],
-        orders: &[],
         in_table: InTable::Yes,
         place: |_| {},
         parameters: &[],

@@ -5,7 +5,6 @@
 //! (nominal, recalibrated, with the causes), and a selector shows the picture of each: the last is without what the
 //! causes explain.
 
-mod orders;
 mod picture;
 mod thin;
 mod why;

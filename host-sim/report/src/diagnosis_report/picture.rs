@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::thin::{dots, medians, some_rows};
-use super::{DiagnosisKnown, Shown, orders, words};
+use super::{DiagnosisKnown, Shown, words};
 use crate::page::{
     ChartAxis, ChartSeries, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection, RichText,
-    Upright, significant,
+    significant,
 };
 use flexspline::FixedMember;
 use flexspline_base::robust::{least_and_most, median_of};
@@ -171,14 +171,12 @@ impl DiagnosisKnown<'_> {
     }
 
     fn spectra(&self) -> PageSection {
-        let (nominal, causes) = (self.sources.nominal, &self.sources.diagnosis.causes);
         let mut blocks = Vec::new();
         for (angle, id) in ANGLES {
             let (symbol, wheel) = self.angle_name(angle);
             let caption = format!(
                 "Amplitude of the sine that explains most at each order ({wheel}: whole orders), and the level that \
-                 noise exceeds nowhere but once in a thousand spectra. Points are lines above it. Upright: where the \
-                 causes that were named put theirs."
+                 noise exceeds nowhere but once in a thousand spectra. Points are lines above it."
             );
             blocks.extend(self.lines(
                 &format!("orders-{id}"),
@@ -194,24 +192,14 @@ impl DiagnosisKnown<'_> {
                     let curve = |y: &[f64]| x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
                     let (amplitude, level) = (curve(&spectrum.amplitude_arcsec), curve(&spectrum.level_arcsec));
                     let peaks = spectrum.peaks.iter().map(|peak| [peak.order, peak.amplitude_arcsec]).collect();
-                    let mut lines = Lines::of(vec![
+                    let mut series = vec![
                         ChartSeries::new("amplitude", Mark::Line, 0, amplitude),
                         ChartSeries::new("level of noise", Mark::Dashed, 5, level),
-                    ]);
+                    ];
                     if !spectrum.peaks.is_empty() {
-                        lines.series.push(ChartSeries::sorted("lines", Mark::Points, 1, peaks));
+                        series.push(ChartSeries::sorted("lines", Mark::Points, 1, peaks));
                     }
-                    let (low, high) = (x[0], x[x.len() - 1]);
-                    for cause in causes {
-                        let places =
-                            orders::along(cause, angle, nominal).into_iter().filter(|x| (low..=high).contains(x));
-                        for x in places {
-                            let name = format!("{}: {}", cause.name.words(), words::order(x));
-                            lines.uprights.push(Upright { name, x });
-                        }
-                    }
-                    lines.uprights.sort_by(|a, b| a.x.total_cmp(&b.x));
-                    Some(lines)
+                    Some(Lines::of(series))
                 },
             ));
         }

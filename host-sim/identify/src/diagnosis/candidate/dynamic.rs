@@ -6,9 +6,7 @@ use std::f64::consts::PI;
 use super::{Coefficients, Excitation, Law, Regressor, Shape, Shaped, Tag, by_row, main, main_about, of_both};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
-    CauseName, CauseSpec, InTable, Kin,
-    Multiple::Fixed,
-    Need, Turn,
+    CauseName, CauseSpec, InTable, Kin, Need,
     Usual::{OfLoad, Value},
     number, phase, plain,
 };
@@ -310,7 +308,6 @@ pub(crate) const GRAVITY_TORQUE: CauseSpec = CauseSpec {
     does: "gravity on the load, which the torque column does not hold",
     kin: Kin::Torque,
     needs: &[Need::Spring],
-    orders: &[(Turn::Output, Fixed(1.0))],
     in_table: InTable::AtOneOrientation,
     made_by_loads: true,
     parameters: &[

@@ -20,9 +20,7 @@ use super::{
 };
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
-    ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, HARMONIC, InTable, Kin,
-    Multiple::{self, Harmonic, ToothMesh},
-    Need, ParameterSpec, Turn,
+    ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, HARMONIC, InTable, Kin, Need, ParameterSpec,
     Usual::{Follows, Value},
     WHEELS, microns, number, phase, plain,
 };
@@ -417,7 +415,6 @@ pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: CauseSpec = CauseSpec {
     words: "eccentricity of the circular spline",
     does: "its axis off the axis of the generator: two waves in a turn of the generator against the circular \
              spline",
-    orders: &[(Turn::CircularSpline, Multiple::Fixed(2.0)), (Turn::CircularSpline, Multiple::Fixed(4.0))],
     place: |placing| {
         let paths = ["as_built.circular_spline_eccentricity_um", "as_built.circular_spline_eccentricity_phase_deg"];
         placing.set_displacement(true, paths);
@@ -433,7 +430,6 @@ pub(crate) const FLEXSPLINE_RUNOUT: CauseSpec = CauseSpec {
     name: "flexspline_runout",
     words: "runout of the flexspline",
     does: "its axis off the axis of the generator: two waves in a generator turn",
-    orders: &[(Turn::Flexspline, Multiple::Fixed(2.0)), (Turn::Flexspline, Multiple::Fixed(4.0))],
     place: |placing| {
         placing.set_displacement(false, ["as_built.flexspline_runout_um", "as_built.flexspline_runout_phase_deg"]);
     },
@@ -448,7 +444,6 @@ pub(crate) const CIRCULAR_SPLINE_OVALITY: CauseSpec = CauseSpec {
     name: "circular_spline_ovality",
     words: "oval circular spline",
     does: "pressed out of round: two waves in a turn against the circular spline",
-    orders: &[(Turn::CircularSpline, Multiple::Fixed(2.0))],
     place: |placing| placing.set_ovality(),
     parameters: &[microns("of the radius", 8.0), ARCSECONDS, phase("angle of a crest of the radius")],
     twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::Oval)],
@@ -465,7 +460,6 @@ pub(crate) const FLEXSPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
     name: "flexspline_pitch_error",
     words: "pitch error of the flexspline",
     does: "teeth out of place: whole orders of the generator turn",
-    orders: &[(Turn::Flexspline, Harmonic)],
     place: |placing| placing.set_pitch_harmonics(Wheel::Flexspline),
     laws: |on| pitch_errors(CauseName::FlexsplinePitchError, Wheel::Flexspline, on),
     simulated: |_, p| simulated_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, p),
@@ -477,7 +471,6 @@ pub(crate) const CIRCULAR_SPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
     name: "circular_spline_pitch_error",
     words: "pitch error of the circular spline",
     does: "teeth out of place: whole orders of a turn against the circular spline",
-    orders: &[(Turn::CircularSpline, Harmonic)],
     place: |placing| placing.set_pitch_harmonics(Wheel::CircularSpline),
     laws: |on| pitch_errors(CauseName::CircularSplinePitchError, Wheel::CircularSpline, on),
     simulated: |_, p| simulated_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, p),
@@ -490,11 +483,6 @@ pub(crate) const CAM_FORM_ERROR: CauseSpec = CauseSpec {
     words: "form error of the generator",
     does: "a shape that is not the drawn one: tooth mesh and even orders of the generator turn",
     needs: &[Need::Teeth],
-    orders: &[
-        (Turn::Generator, Multiple::Fixed(4.0)),
-        (Turn::Generator, Multiple::Fixed(6.0)),
-        (Turn::Generator, ToothMesh),
-    ],
     parameters: &[microns("of the error it makes", 3.0), ARCSECONDS, phase("of the form")],
     twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
     laws: |_| vec![cam_form_error()],
@@ -511,11 +499,6 @@ pub(crate) const DAMAGED_TOOTH: CauseSpec = CauseSpec {
     does: "a pulse each time a lobe passes one place",
     kin: Kin::Pulse,
     needs: &[Need::Teeth, Need::Turns],
-    orders: &[
-        (Turn::OfWheel, Multiple::Fixed(2.0)),
-        (Turn::OfWheel, Multiple::Fixed(4.0)),
-        (Turn::OfWheel, Multiple::Fixed(6.0)),
-    ],
     place: |placing| placing.set_damaged_tooth(),
     parameters: &[
         number(Name::DepthUm, "depth that lacks, along the normal", 0.0, 500.0, Value(10.0)),
@@ -541,7 +524,6 @@ pub(crate) const GRAVITY_SIDE_LOAD: CauseSpec = CauseSpec {
     name: "gravity_side_load",
     words: "side load by gravity",
     does: "a weight that pushes the wheels out of centre",
-    orders: &[(Turn::Generator, Multiple::Fixed(2.0)), (Turn::Generator, Multiple::Fixed(4.0))],
     in_table: InTable::AtOneOrientation,
     place: |placing| placing.set_offset(),
     parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, against gravity"), HALF_LOAD],

@@ -12,9 +12,7 @@ use super::{
     nuisance, of_wave, times,
 };
 use crate::causes::ParameterName as Name;
-use crate::causes::spec::{
-    ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, Multiple::Fixed, Turn, Usual::Value, microns, number, phase,
-};
+use crate::causes::spec::{ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, Usual::Value, microns, number, phase};
 
 /// Plausible differences between the lobes, arcsec at the output. *Guess*: from what noise hides to more than a usual
 /// clearance.
@@ -156,7 +154,6 @@ pub(crate) const GENERATOR_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "generator_eccentricity",
     words: "eccentricity of the generator",
     does: "one lobe carries more: odd orders, once in a turn above all",
-    orders: &[(Turn::Flexspline, Fixed(1.0)), (Turn::CircularSpline, Fixed(1.0))],
     parameters: &[
         microns("once around each wheel: what the deeper lobe shows of the teeth", 2.0),
         ARCSECONDS,

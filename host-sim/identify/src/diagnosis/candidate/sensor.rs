@@ -6,9 +6,7 @@ use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Named, Regressor, Simulated, Tag, Values, by_row, main, nuisance, polar};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
-    CauseName, CauseSpec, ENCODERS, Factor, InTable, Kin,
-    Multiple::{Fixed, Harmonic},
-    Need, OF_THE_OUTPUT_ENCODER, ParameterSpec, Turn,
+    CauseName, CauseSpec, ENCODERS, Factor, InTable, Kin, Need, OF_THE_OUTPUT_ENCODER, ParameterSpec,
     Usual::{Follows, Value},
     number, phase, plain,
 };
@@ -159,7 +157,6 @@ pub(crate) const OUTPUT_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "output_encoder_eccentricity",
     words: "eccentricity of the output encoder",
     does: "one wave in an output turn, whatever the load",
-    orders: &[(Turn::Output, Fixed(1.0))],
     in_table: InTable::No(OF_THE_OUTPUT_ENCODER),
     made_by_loads: true,
     parameters: &[
@@ -181,7 +178,6 @@ pub(crate) const GENERATOR_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "generator_encoder_eccentricity",
     words: "eccentricity of the generator encoder",
     does: "one wave in a generator turn, whatever the load",
-    orders: &[(Turn::Generator, Fixed(1.0))],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(10.0)),
         AT_THE_GENERATOR,
@@ -199,7 +195,6 @@ pub(crate) const OUTPUT_ENCODER_TILT: CauseSpec = CauseSpec {
     words: "tilt of the output encoder",
     does: "two waves in an output turn, whatever the load",
     needs: &[Need::HalfOutputTurn],
-    orders: &[(Turn::Output, Fixed(2.0))],
     in_table: InTable::No(OF_THE_OUTPUT_ENCODER),
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 10_000.0, Value(15.0)),
@@ -217,7 +212,6 @@ pub(crate) const GENERATOR_ENCODER_TILT: CauseSpec = CauseSpec {
     words: "tilt of the generator encoder",
     does: "two waves in a generator turn, the same on both flanks and under any load",
     kin: Kin::Shape,
-    orders: &[(Turn::Generator, Fixed(2.0))],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(8.0)),
         AT_THE_GENERATOR,
@@ -234,7 +228,6 @@ pub(crate) const ENCODER_SUBDIVISION: CauseSpec = CauseSpec {
     name: "encoder_subdivision",
     words: "subdivision error of an encoder",
     does: "four waves or a multiple in a turn of an encoder, whatever the load and the speed",
-    orders: &[(Turn::OfEncoder, Harmonic)],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(6.0)),
         AT_THE_GENERATOR,

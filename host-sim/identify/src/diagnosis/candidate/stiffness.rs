@@ -8,9 +8,7 @@ use super::geometry::{Angle, angle, pulse, weighted_waves};
 use super::{Coefficients, Excitation, Law, Shape, Shaped, Tag, by_row, main, nuisance};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
-    CauseName, CauseSpec, InTable, Kin,
-    Multiple::Fixed,
-    Need, TIME, Turn,
+    CauseName, CauseSpec, InTable, Kin, Need, TIME,
     Usual::{OfLoad, ToothPitch, Value},
     number, plain,
 };
@@ -310,11 +308,6 @@ pub(crate) const CRACKED_TOOTH_ROOT: CauseSpec = CauseSpec {
     does: "softer each time a lobe passes one tooth of the circular spline: nothing there without load",
     kin: Kin::Pulse,
     needs: &[Need::Teeth, Need::Turns, Need::Load],
-    orders: &[
-        (Turn::CircularSpline, Fixed(2.0)),
-        (Turn::CircularSpline, Fixed(4.0)),
-        (Turn::CircularSpline, Fixed(6.0)),
-    ],
     parameters: &[
         number(Name::AmplitudeArcsec, "by which it winds up more at the full load", 0.0, 1000.0, Value(30.0)),
         number(Name::FullLoadNM, "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
