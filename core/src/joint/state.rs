@@ -348,7 +348,6 @@ impl JointState {
     }
 
     /// The play; unknown where the state is lost.
-    #[must_use]
     pub const fn play(&self) -> &PlayState {
         &self.kept().play
     }

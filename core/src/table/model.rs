@@ -301,7 +301,6 @@ impl<'a> Table<'a> {
 
     /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target.
     /// Locates torque and temperature once; the answers are the same.
-    #[must_use]
     pub fn step(
         &self,
         state: &mut PlayState,

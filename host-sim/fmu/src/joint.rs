@@ -242,7 +242,7 @@ impl Model for MovingJoint {
         if servo {
             let target_rad = at.start(OUTPUT_ANGLE_COMMAND);
             let held = OutputAngle::from_rad(target_rad).and(GeneratorAngle::from_rad(target_rad * joint.ratio()));
-            held.ok_or(FmuError::Value {
+            let _ = held.ok_or(FmuError::Value {
                 name: VARIABLES[OUTPUT_ANGLE_COMMAND].name,
                 found: target_rad,
                 allowed: "an angle for which the generator makes less than 2e9 turns",
