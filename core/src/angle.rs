@@ -26,6 +26,7 @@ pub fn counts_from_rad(small_rad: f32) -> i32 {
 macro_rules! angle {
     ($(#[$doc:meta])* $name:ident) => {
         $(#[$doc])*
+        #[must_use]
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         pub struct $name {
             counts: i64,
@@ -36,13 +37,11 @@ macro_rules! angle {
             pub const ZERO: Self = Self { counts: 0 };
 
             /// `turns` whole turns and `fraction`·2⁻³² of a turn: −¼ turn is `new(-1, 3 << 30)`.
-            #[must_use]
             pub const fn new(turns: i32, fraction: u32) -> Self {
                 Self { counts: ((turns as i64) << 32) | fraction as i64 }
             }
 
             /// From counts of 2⁻³² turn.
-            #[must_use]
             pub const fn from_counts(counts: i64) -> Self {
                 Self { counts }
             }
@@ -79,6 +78,12 @@ macro_rules! angle {
                 Some(Self { counts: (counts + half) as i64 })
             }
 
+            /// As [`Self::from_rad`], of an angle with its unit; a number is in radians.
+            #[must_use]
+            pub fn of(angle: impl Into<f64>) -> Option<Self> {
+                Self::from_rad(angle.into())
+            }
+
             /// In radians; exact to 2⁻⁵³ of the angle. For the host and for start-up.
             #[must_use]
             pub fn to_rad(self) -> f64 {
@@ -86,14 +91,12 @@ macro_rules! angle {
             }
 
             /// This angle plus a count of 2⁻³² turns; wraps.
-            #[must_use]
             pub const fn offset_counts(self, counts: i64) -> Self {
                 Self { counts: self.counts.wrapping_add(counts) }
             }
 
             /// This angle plus a small one in radians, to the nearest count (or the nearest `f32`, if that is
             /// coarser); clamped to ±π. NaN adds nothing.
-            #[must_use]
             pub fn offset_rad(self, small_rad: f32) -> Self {
                 self.offset_counts(counts_from_rad(small_rad) as i64)
             }

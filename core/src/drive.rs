@@ -39,6 +39,7 @@ pub struct Drive {
 }
 
 /// Where the periodic parts of a table are read, each as a fraction of its own period in 2⁻³².
+#[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Phases {
     /// ψ: the generator relative to the fixed member, one period a generator turn.
@@ -154,19 +155,16 @@ impl Drive {
     /// The ideal output angle `generator/ratio`, to half a count below a million turns, to 5/4 count at any number.
     ///
     /// Integer only, no division: five 32-bit multiplications.
-    #[must_use]
     pub const fn nominal_output(&self, generator: GeneratorAngle) -> OutputAngle {
         OutputAngle::from_counts(self.with_sign(self.to_output.of(generator.counts())))
     }
 
     /// The generator angle `output·ratio` of an ideal drive, with the same error; wraps beyond ±2³¹ generator turns.
-    #[must_use]
     pub const fn nominal_generator(&self, output: OutputAngle) -> GeneratorAngle {
         GeneratorAngle::from_counts(self.with_sign(self.to_generator.of(output.counts())))
     }
 
     /// Where the periodic parts of a table are read at this generator angle; `nominal` is its nominal output.
-    #[must_use]
     pub fn phases(&self, generator: GeneratorAngle, nominal: OutputAngle) -> Phases {
         Phases {
             generator: generator.fraction(),
@@ -177,7 +175,6 @@ impl Drive {
     }
 
     /// Phases from the nominal output alone, each phase within 2⁻³² of a period at any number of turns.
-    #[must_use]
     pub(crate) const fn phases_at_output(&self, nominal: OutputAngle) -> Phases {
         // Not kept: what is kept is checked in every tick.
         let generator = Rate::new(self.to_generator, 1, self.reversed < 0).phase(nominal.counts());
@@ -300,12 +297,9 @@ impl Drive {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Drive { flexspline_teeth, circular_spline_teeth, reversed, to_output, to_generator, tooth_rate });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(ToothRatio { whole, fraction });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Rate { periods, rest });
+bits_of!(Drive { flexspline_teeth, circular_spline_teeth, reversed, to_output, to_generator, tooth_rate });
+bits_of!(ToothRatio { whole, fraction });
+bits_of!(Rate { periods, rest });
 
 #[cfg(test)]
 mod tests {

@@ -306,10 +306,8 @@ const fn mask(bits: u8) -> u64 {
     u64::MAX.wrapping_shr(64u32.saturating_sub(bits as u32))
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Encoder { settings });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(EncoderState { at });
+bits_of!(Encoder { settings });
+bits_of!(EncoderState { at });
 
 #[cfg(test)]
 mod tests {

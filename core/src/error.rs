@@ -24,79 +24,63 @@ impl fmt::Display for DriveError {
 
 impl core::error::Error for DriveError {}
 
-/// A field of a table or its image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Field {
-    /// The text that names the program that made the table.
-    ToolVersion,
-    /// The text that names the mesh.
-    MeshLevel,
-    /// Torque nodes, N·m.
-    TorqueNodes,
-    /// Temperature nodes, °C.
-    TemperatureNodes,
-    /// Nodes over one tooth pitch.
-    RippleNodes,
-    /// Curve over the generator angle ψ, rad.
-    GeneratorCurve,
-    /// Curve over the material phase ψ − δ, rad.
-    MaterialCurve,
-    /// Curve over the output angle δ, rad.
-    OutputCurve,
-    /// Mean error (wind-up) at a torque and temperature, rad.
-    Mean,
-    /// Mean half-width of the play, rad.
-    HalfWidth,
-    /// Slope of the mean error over the torque, counts/(N·m).
-    MeanSlope,
-    /// Ripple of the mean over one tooth pitch, rad.
-    MeanRipple,
-    /// Ripple of the half-width over one tooth pitch, rad.
-    HalfWidthRipple,
-    /// Residual the solver reached.
-    SolverResidual,
-    /// Largest deviation of the table from the samples, rad.
-    ProjectionWorst,
-    /// Root mean square deviation of the table from the samples, rad.
-    ProjectionRms,
-    /// Torques the table holds for, N·m.
-    TorqueRange,
-    /// Temperatures the table holds for, °C.
-    TemperatureRange,
-    /// Largest error the table may give, rad.
-    ErrorLimit,
-}
-
-impl Field {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::ToolVersion => "tool version",
-            Self::MeshLevel => "mesh level",
-            Self::TorqueNodes => "torque nodes",
-            Self::TemperatureNodes => "temperature nodes",
-            Self::RippleNodes => "ripple nodes",
-            Self::GeneratorCurve => "curve over the generator angle",
-            Self::MaterialCurve => "curve over the material phase",
-            Self::OutputCurve => "curve over the output angle",
-            Self::Mean => "mean error",
-            Self::HalfWidth => "half-width of the play",
-            Self::MeanSlope => "slope of the mean error",
-            Self::MeanRipple => "ripple of the mean",
-            Self::HalfWidthRipple => "ripple of the half-width",
-            Self::SolverResidual => "solver residual",
-            Self::ProjectionWorst => "worst projection error",
-            Self::ProjectionRms => "rms projection error",
-            Self::TorqueRange => "torque range",
-            Self::TemperatureRange => "temperature range",
-            Self::ErrorLimit => "error limit",
+macro_rules! fields {
+    ($($(#[$doc:meta])* $field:ident: $name:literal,)*) => {
+        /// A field of a table or its image.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Field {
+            $($(#[$doc])* $field,)*
         }
-    }
+
+        impl fmt::Display for Field {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$field => $name,)*
+                })
+            }
+        }
+    };
 }
 
-impl fmt::Display for Field {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
+fields! {
+    /// The text that names the program that made the table.
+    ToolVersion: "tool version",
+    /// The text that names the mesh.
+    MeshLevel: "mesh level",
+    /// Torque nodes, N·m.
+    TorqueNodes: "torque nodes",
+    /// Temperature nodes, °C.
+    TemperatureNodes: "temperature nodes",
+    /// Nodes over one tooth pitch.
+    RippleNodes: "ripple nodes",
+    /// Curve over the generator angle ψ, rad.
+    GeneratorCurve: "curve over the generator angle",
+    /// Curve over the material phase ψ − δ, rad.
+    MaterialCurve: "curve over the material phase",
+    /// Curve over the output angle δ, rad.
+    OutputCurve: "curve over the output angle",
+    /// Mean error (wind-up) at a torque and temperature, rad.
+    Mean: "mean error",
+    /// Mean half-width of the play, rad.
+    HalfWidth: "half-width of the play",
+    /// Slope of the mean error over the torque, counts/(N·m).
+    MeanSlope: "slope of the mean error",
+    /// Ripple of the mean over one tooth pitch, rad.
+    MeanRipple: "ripple of the mean",
+    /// Ripple of the half-width over one tooth pitch, rad.
+    HalfWidthRipple: "ripple of the half-width",
+    /// Residual the solver reached.
+    SolverResidual: "solver residual",
+    /// Largest deviation of the table from the samples, rad.
+    ProjectionWorst: "worst projection error",
+    /// Root mean square deviation of the table from the samples, rad.
+    ProjectionRms: "rms projection error",
+    /// Torques the table holds for, N·m.
+    TorqueRange: "torque range",
+    /// Temperatures the table holds for, °C.
+    TemperatureRange: "temperature range",
+    /// Largest error the table may give, rad.
+    ErrorLimit: "error limit",
 }
 
 /// Why an image is refused. The first check that fails is reported: the envelope (length, magic, byte order, version,

@@ -52,6 +52,7 @@ pub(crate) const MOST_ERROR_COUNTS: u32 =
 const MOST_KEPT_COUNTS: u32 = MOST_ERROR_COUNTS + MAX_PLAY_COUNTS as u32;
 
 /// Where the drive rests inside its play: all that must survive a reset.
+#[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlayState {
     /// Nominal output at the last update.
@@ -76,13 +77,11 @@ impl PlayState {
     pub const SAVED_BYTES: usize = 28;
 
     /// After a reset: anywhere inside the play.
-    #[must_use]
     pub const fn unknown() -> Self {
         Self { nominal: OutputAngle::ZERO, error: 0, lower: i32::MIN, upper: i32::MAX, half: -1 }
     }
 
     /// Known to have last moved in `direction` through the full play.
-    #[must_use]
     pub const fn after_motion(direction: Direction) -> Self {
         let side = match direction {
             Direction::Forward => i32::MIN,
@@ -258,8 +257,7 @@ const fn clamped(offset: i32, half: i32) -> i32 {
     if above > half { half } else { above }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(PlayState { nominal, error, lower, upper, half });
+bits_of!(PlayState { nominal, error, lower, upper, half });
 
 #[cfg(test)]
 mod tests {

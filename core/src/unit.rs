@@ -9,66 +9,44 @@
 //! # Ok::<(), &str>(())
 //! ```
 
-use crate::angle::{GeneratorAngle, OutputAngle};
 use core::f64::consts::PI;
 
-/// An angle in degrees.
-#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-pub struct Degrees(pub f64);
+macro_rules! unit {
+    ($(#[$doc:meta])* $name:ident: $in_half_turn:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+        pub struct $name(pub f64);
 
-/// An angle in arcseconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-pub struct Arcsec(pub f64);
+        impl $name {
+            /// In radians, as the number that settings take.
+            #[must_use]
+            pub const fn rad(self) -> f32 {
+                (self.0 * (PI / $in_half_turn)) as f32
+            }
+        }
 
-impl Degrees {
-    /// In radians, as the number that settings take.
-    #[must_use]
-    pub const fn rad(self) -> f32 {
-        (self.0 * (PI / 180.0)) as f32
-    }
+        /// In radians.
+        impl From<$name> for f64 {
+            fn from($name(angle): $name) -> Self {
+                angle * (PI / $in_half_turn)
+            }
+        }
+    };
 }
 
-impl Arcsec {
-    /// In radians, as the number that settings take.
-    #[must_use]
-    pub const fn rad(self) -> f32 {
-        (self.0 * (PI / 648_000.0)) as f32
-    }
+unit! {
+    /// An angle in degrees.
+    Degrees: 180.0
 }
-
-/// In radians.
-impl From<Degrees> for f64 {
-    fn from(Degrees(degrees): Degrees) -> Self {
-        degrees * (PI / 180.0)
-    }
-}
-
-/// In radians.
-impl From<Arcsec> for f64 {
-    fn from(Arcsec(arcsec): Arcsec) -> Self {
-        arcsec * (PI / 648_000.0)
-    }
-}
-
-impl GeneratorAngle {
-    /// As [`Self::from_rad`], of an angle with its unit; a number is in radians.
-    #[must_use]
-    pub fn of(angle: impl Into<f64>) -> Option<Self> {
-        Self::from_rad(angle.into())
-    }
-}
-
-impl OutputAngle {
-    /// As [`Self::from_rad`], of an angle with its unit; a number is in radians.
-    #[must_use]
-    pub fn of(angle: impl Into<f64>) -> Option<Self> {
-        Self::from_rad(angle.into())
-    }
+unit! {
+    /// An angle in arcseconds.
+    Arcsec: 648_000.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{GeneratorAngle, OutputAngle};
 
     #[test]
     fn an_angle_is_the_same_in_every_unit() {

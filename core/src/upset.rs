@@ -16,29 +16,36 @@ pub trait Upset {
     fn flip(&mut self, bit: usize, path: &mut String);
 }
 
-macro_rules! numbers {
-    ($($number:ty),*) => {$(
-        impl Upset for $number {
+macro_rules! kinds {
+    ($([$($generic:ident)*] $kind:ty: $bits:expr, |$value:ident, $bit:pat_param| $flip:expr;)*) => {$(
+        impl<$($generic)*> Upset for $kind {
             fn bits(&self) -> usize {
-                <$number>::BITS as usize
+                $bits
             }
 
-            fn flip(&mut self, bit: usize, _: &mut String) {
-                *self ^= 1 << bit;
+            fn flip(&mut self, $bit: usize, _: &mut String) {
+                let $value = self;
+                $flip
             }
         }
     )*};
 }
-numbers!(u8, u16, u32, u64, usize, i32, i64);
-
-impl Upset for bool {
-    fn bits(&self) -> usize {
-        1
-    }
-
-    fn flip(&mut self, _: usize, _: &mut String) {
-        *self = !*self;
-    }
+kinds! {
+    [] u8: 8, |number, bit| *number ^= 1 << bit;
+    [] u16: 16, |number, bit| *number ^= 1 << bit;
+    [] u32: 32, |number, bit| *number ^= 1 << bit;
+    [] u64: 64, |number, bit| *number ^= 1 << bit;
+    [] usize: usize::BITS as usize, |number, bit| *number ^= 1 << bit;
+    [] i32: 32, |number, bit| *number ^= 1 << bit;
+    [] i64: 64, |number, bit| *number ^= 1 << bit;
+    [] f32: 32, |number, bit| *number = f32::from_bits(number.to_bits() ^ 1 << bit);
+    [] bool: 1, |flag, _| *flag = !*flag;
+    [] GeneratorAngle: 64, |angle, bit| *angle = GeneratorAngle::from_counts(angle.counts() ^ 1 << bit);
+    [] OutputAngle: 64, |angle, bit| *angle = OutputAngle::from_counts(angle.counts() ^ 1 << bit);
+    [] crate::TableId: 64, |id, bit| id.0[bit / 8] ^= 1 << (bit % 8);
+    [T] core::marker::PhantomData<T>: 0, |_none, _| ();
+    // Reported only.
+    [] crate::GeneratorKind: 0, |_kind, _| ();
 }
 
 /// The mark that there is something, then all of it: zeros if there was nothing.
@@ -57,58 +64,6 @@ impl<T: Upset + Default> Upset for Option<T> {
             }
         };
     }
-}
-
-impl Upset for f32 {
-    fn bits(&self) -> usize {
-        32
-    }
-
-    fn flip(&mut self, bit: usize, _: &mut String) {
-        *self = f32::from_bits(self.to_bits() ^ 1 << bit);
-    }
-}
-
-macro_rules! angles {
-    ($($angle:ty),*) => {$(
-        impl Upset for $angle {
-            fn bits(&self) -> usize {
-                64
-            }
-
-            fn flip(&mut self, bit: usize, _: &mut String) {
-                *self = Self::from_counts(self.counts() ^ 1 << bit);
-            }
-        }
-    )*};
-}
-angles!(GeneratorAngle, OutputAngle);
-
-impl Upset for crate::TableId {
-    fn bits(&self) -> usize {
-        64
-    }
-
-    fn flip(&mut self, bit: usize, _: &mut String) {
-        self.0[bit / 8] ^= 1 << (bit % 8);
-    }
-}
-
-impl<T> Upset for core::marker::PhantomData<T> {
-    fn bits(&self) -> usize {
-        0
-    }
-
-    fn flip(&mut self, _: usize, _: &mut String) {}
-}
-
-/// Reported only.
-impl Upset for crate::GeneratorKind {
-    fn bits(&self) -> usize {
-        0
-    }
-
-    fn flip(&mut self, _: usize, _: &mut String) {}
 }
 
 impl<T: Upset, const N: usize> Upset for [T; N] {

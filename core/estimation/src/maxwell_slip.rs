@@ -122,7 +122,6 @@ impl Slip {
     }
 
     /// An adjustment with this added, and its uncertainty: while springs are not known the tick says so.
-    #[must_use]
     pub fn added_to(&self, adjustment: Adjustment) -> Adjustment {
         adjustment.with([self.mean_counts(), 0, uncertainty_counts(self.uncertainty_rad)])
     }

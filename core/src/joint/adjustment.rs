@@ -13,6 +13,7 @@ use crate::whole::{START, Sealed, add};
 ///
 /// It is kept under a sum: an upset of one word is mended where the adjustment is used. One that is lost is not used;
 /// the tick keeps its correction as without a torque ([`Flags::NOT_CORRECTED`](crate::Flags::NOT_CORRECTED)).
+#[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Adjustment {
     /// Mean, half-width, uncertainty.
@@ -35,7 +36,6 @@ impl Adjustment {
     const LOST: Self = Self { counts: Sealed::of([0; 3], 0) };
 
     /// Adds these to the mean error (actual less nominal) and to the half-width of the play.
-    #[must_use]
     pub const fn new(mean_counts: i32, half_width_counts: i32) -> Self {
         Self::of([mean_counts, half_width_counts, 0])
     }
@@ -47,7 +47,6 @@ impl Adjustment {
     }
 
     /// From radians at the output, rounded to a count; saturates at ±[`Self::MAX_RAD`], NaN is taken as none.
-    #[must_use]
     pub fn from_rad(mean_rad: f32, half_width_rad: f32) -> Self {
         let counts = |rad: f32| bounded(counts_from_rad(rad));
         Self::new(counts(mean_rad), counts(half_width_rad))
@@ -56,14 +55,12 @@ impl Adjustment {
     /// With an uncertainty of the mean that is larger by this, rad: the tick adds it to its own
     /// ([`Output::uncertainty_rad`](crate::Output::uncertainty_rad)) and is
     /// [`Uncertain`](crate::Quality::Uncertain). Below 0 and NaN count as [`Self::MAX_RAD`], which is the largest.
-    #[must_use]
     pub fn with_uncertainty(self, rad: f32) -> Self {
         self.with([0, 0, uncertainty_counts(rad)])
     }
 
     /// With these added; lost if it is.
     #[doc(hidden)]
-    #[must_use]
     pub fn with(self, [more, wider, further]: [i32; 3]) -> Self {
         let Some([mean, half_width, uncertainty]) = self.open() else { return Self::LOST };
         let sum = |one: i32, other: i32| within(one.saturating_add(other), Self::MAX_COUNTS.wrapping_neg());
@@ -71,7 +68,6 @@ impl Adjustment {
     }
 
     /// The sum of two, each part held within ±[`Self::MAX_COUNTS`]; lost if either is.
-    #[must_use]
     pub fn plus(self, other: Self) -> Self {
         other.open().map_or(Self::LOST, |counts| self.with(counts))
     }
@@ -121,5 +117,4 @@ pub const fn bounded(counts: i32) -> i32 {
     within(counts, !Adjustment::MAX_COUNTS)
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Adjustment { counts });
+bits_of!(Adjustment { counts });

@@ -64,8 +64,7 @@ impl Aged {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Aged { words, again });
+bits_of!(Aged { words, again });
 
 #[cfg(test)]
 mod tests {

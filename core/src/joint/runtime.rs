@@ -40,7 +40,7 @@ use crate::drive::Drive;
 use crate::encoder::{Encoder, EncoderState};
 use crate::num;
 use crate::play::PlayState;
-use crate::store::{Images, Store, TableStatus};
+use crate::store::{Images, Store};
 use crate::table::{
     Approach, Command, Estimate, MAX_ERROR_RAD, Memory, OperatingPoint, Prediction, Quality, TableModel, departure,
 };
@@ -98,10 +98,7 @@ impl Joint {
     /// (generator) in a tick, or a rate below 1.8e-10 rad in a tick, an acceleration below that in a tick more each
     /// tick, a fastest generator below 1.5e-9 rad in a tick, a hold below that, or a tick below 1e-7 s.
     pub const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
-        match JointSettings::new(drive, limits, overrun) {
-            Ok(settings) => Ok(Self { copies: [settings; 2] }),
-            Err(error) => Err(error),
-        }
+        Ok(Self { copies: [tried!(JointSettings::new(drive, limits, overrun)); 2] })
     }
 
     /// With a largest acceleration of the generator, rad/s²: a sample that would need more is a glitch, and one that is
@@ -118,10 +115,7 @@ impl Joint {
     pub const fn with_generator_acceleration(self, rad_s2: f32) -> Result<Self, SettingError> {
         let Some(settings) = self.sound() else { return Err(SettingError { name: "joint", found: f32::NAN }) };
         let per_tick = num::counts(rad_s2 as f64 * settings.tick_s as f64 * settings.tick_s as f64);
-        let bend = match checked("generator_acceleration_rad_s2", rad_s2, per_tick, [1.0, f64::MAX]) {
-            Ok(counts) => counts as i32,
-            Err(error) => return Err(error),
-        };
+        let bend = tried!(checked("generator_acceleration_rad_s2", rad_s2, per_tick, [1.0, f64::MAX])) as i32;
         // From full speed to full speed back is all that samples within the largest move can do.
         let bend = within(bend, settings.noise(), settings.largest_move.saturating_mul(2));
         Ok(Self { copies: [JointSettings { largest_bend: bend, spike: bend, ..*settings }.sealed(); 2] })
@@ -166,7 +160,6 @@ impl Joint {
 
     /// Output angle for a generator angle, with the play followed in `play`: as [`crate::Table::forward`], from the
     /// copies. Disabled, as [`Self::inverse`], where the settings are lost or the table is for another drive.
-    #[must_use]
     pub fn forward(
         &self,
         store: &Store,
@@ -179,7 +172,6 @@ impl Joint {
     }
 
     /// Generator angle that brings the output to `target`: as [`crate::Table::inverse`], from the copies.
-    #[must_use]
     pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
         let (model, point) = self.at(store, torque_n_m);
         model.aim(&point, target, approach)
@@ -262,34 +254,21 @@ impl JointSettings {
         let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, debounce_ticks, deadband_rad } =
             limits;
         let tick = tick_s as f64;
-        if let Err(error) = checked("tick_s", tick_s, tick, [LEAST_TICK_S, 1.0e3]) {
-            return Err(error);
-        }
+        tried!(checked("tick_s", tick_s, tick, [LEAST_TICK_S, 1.0e3]));
         // Slower than one part in a tick would be no correction at all.
         let bounds = [1.0, num::counts(0.05) * FINE as f64];
-        let rate = match checked("rate_rad_s", rate_rad_s, num::counts(rate_rad_s as f64 * tick) * FINE as f64, bounds)
-        {
-            Ok(rate) => rate,
-            Err(error) => return Err(error),
-        };
+        let per_tick = num::counts(rate_rad_s as f64 * tick) * FINE as f64;
+        let rate = tried!(checked("rate_rad_s", rate_rad_s, per_tick, bounds));
         let per_tick = num::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
-        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [1.0, 1.0e12]) {
-            Ok(acceleration) => acceleration,
-            Err(error) => return Err(error),
-        };
+        let acceleration = tried!(checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [1.0, 1.0e12]));
         // More than from full speed to full speed back is not needed, and would drown what is left to go in rounding.
         let acceleration = if acceleration < 2.0 * rate { acceleration } else { 2.0 * rate };
         let per_tick = num::counts(generator_rate_rad_s as f64 * tick);
-        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, [1.0, 2_147_483_000.0])
-        {
-            Ok(counts) => counts as i32,
-            Err(error) => return Err(error),
-        };
+        let bounds = [1.0, 2_147_483_000.0];
+        let largest_move = tried!(checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, bounds)) as i32;
         let hold = num::counts(deadband_rad as f64);
-        if deadband_rad != 0.0
-            && let Err(error) = checked("deadband_rad", deadband_rad, hold, [1.0, num::counts(0.05)])
-        {
-            return Err(error);
+        if deadband_rad != 0.0 {
+            tried!(checked("deadband_rad", deadband_rad, hold, [1.0, num::counts(0.05)]));
         }
         let (fade, hold_late) = match overrun {
             Overrun::FadeOut { ticks } => (ticks, 0),
@@ -431,7 +410,7 @@ impl JointSettings {
 
         let (goal, late) = self.goal(&mut now, input, wanted, sane);
         let correction = self.limit(&mut now, goal, point.most(store.plan()).wrapping_mul(FINE));
-        let TableStatus { whole, other_images } = store.table_status(images);
+        let (whole, other_images) = store.table_status(images);
         let again = !(whole & self.is_whole() & doubt.none());
         if now.seen() == 0 {
             // Nothing was seen of the generator yet.
@@ -596,10 +575,8 @@ impl JointSettings {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Joint { copies });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(JointSettings {
+bits_of!(Joint { copies });
+bits_of!(JointSettings {
     drive,
     hold_late,
     rate,

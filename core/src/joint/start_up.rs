@@ -282,8 +282,7 @@ fn differs(
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(StartUp { test });
+bits_of!(StartUp { test });
 
 #[cfg(test)]
 mod tests {

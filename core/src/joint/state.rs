@@ -256,12 +256,11 @@ impl Default for JointState {
 impl JointState {
     /// Bytes of a saved state.
     pub const SAVED_BYTES: usize = 72;
-    const NEW: [SealedState; 2] = [Kept::NEW.sealed(); 2];
 
     /// After a reset: no correction, the side of the play unknown, off.
     #[must_use]
     pub const fn new() -> Self {
-        Self { copies: Self::NEW, missed_ticks: 0 }
+        Self { copies: [Kept::NEW.sealed(); 2], missed_ticks: 0 }
     }
 
     /// Values of the copy that is whole.
@@ -349,7 +348,6 @@ impl JointState {
     }
 
     /// The play; unknown where the state is lost.
-    #[must_use]
     pub const fn play(&self) -> &PlayState {
         &self.kept().play
     }
@@ -457,22 +455,7 @@ impl JointState {
 
 const _: () = assert!(size_of::<Kept>() == 64);
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(JointState { copies, missed_ticks });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(SealedState { kept, samples, sums });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Kept {
-    play,
-    adjusted,
-    generator,
-    correction,
-    goal,
-    speed,
-    glitches,
-    uncorrected,
-    fading,
-    marks,
-});
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(LastSamples { step, bend, free });
+bits_of!(JointState { copies, missed_ticks });
+bits_of!(SealedState { kept, samples, sums });
+bits_of!(Kept { play, adjusted, generator, correction, goal, speed, glitches, uncorrected, fading, marks });
+bits_of!(LastSamples { step, bend, free });

@@ -130,33 +130,17 @@ impl TorquePath {
     pub const fn new(settings: TorqueSettings) -> Result<Self, SettingError> {
         let TorqueSettings { tick_s, bandwidth_hz, drag_n_m, table_drag_n_m, hold_n_m, settle_s, largest_n_m } =
             settings;
-        if let Err(error) = checked("tick_s", tick_s, tick_s as f64, [LEAST_TICK_S, 1e3]) {
-            return Err(error);
-        }
-        if let Err(error) = checked("bandwidth_hz", bandwidth_hz, bandwidth_hz as f64, [0.0, 1e9]) {
-            return Err(error);
-        }
+        tried!(checked("tick_s", tick_s, tick_s as f64, [LEAST_TICK_S, 1e3]));
+        tried!(checked("bandwidth_hz", bandwidth_hz, bandwidth_hz as f64, [0.0, 1e9]));
         // Zero is allowed, so one more is judged.
-        if let Err(error) = checked("drag_n_m", drag_n_m, drag_n_m as f64 + 1.0, [1.0, 1e9]) {
-            return Err(error);
-        }
-        if let Err(error) = checked("table_drag_n_m", table_drag_n_m, table_drag_n_m as f64 + 1.0, [1.0, 1e9]) {
-            return Err(error);
-        }
-        if let Err(error) = checked("hold_n_m", hold_n_m, hold_n_m as f64 + 1.0, [1.0, 1e9]) {
-            return Err(error);
-        }
-        if let Err(error) = checked("settle_s", settle_s, settle_s as f64 + 1.0, [1.0, 1e6]) {
-            return Err(error);
-        }
-        if let Err(error) = checked("largest_n_m", largest_n_m, largest_n_m as f64, [LEAST_N_M, 1e9]) {
-            return Err(error);
-        }
+        tried!(checked("drag_n_m", drag_n_m, drag_n_m as f64 + 1.0, [1.0, 1e9]));
+        tried!(checked("table_drag_n_m", table_drag_n_m, table_drag_n_m as f64 + 1.0, [1.0, 1e9]));
+        tried!(checked("hold_n_m", hold_n_m, hold_n_m as f64 + 1.0, [1.0, 1e9]));
+        tried!(checked("settle_s", settle_s, settle_s as f64 + 1.0, [1.0, 1e6]));
+        tried!(checked("largest_n_m", largest_n_m, largest_n_m as f64, [LEAST_N_M, 1e9]));
         let along = TAU * bandwidth_hz as f64 * tick_s as f64;
         // Less is lost in the rounding of what it is added to.
-        if let Err(error) = checked("bandwidth_hz", bandwidth_hz, along, [1e-7, f64::MAX]) {
-            return Err(error);
-        }
+        tried!(checked("bandwidth_hz", bandwidth_hz, along, [1e-7, f64::MAX]));
         let share = (along / (1.0 + along)) as f32;
         // To the next whole tick, but for rounding, and no more than a count holds.
         let settle = (settle_s as f64 / tick_s as f64 + 0.999) as u16;
@@ -285,8 +269,7 @@ impl PathState {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(TorquePath { path });
+bits_of!(TorquePath { path });
 
 #[cfg(test)]
 mod tests {

@@ -19,25 +19,22 @@ const MOST_STEPS: u32 = 40_000;
 /// Of [`ActivatedTable::images`].
 const OF_SECOND: u32 = 2;
 
-/// Work of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ActivationStage {
-    /// Whether both images are the same, words of them.
-    Compare,
-    /// The first image is checked, or the second.
-    First,
-    Second,
-    /// Neither is a table: the first is checked again, for what is wrong with it.
-    Refuse,
-    /// The result is compared with the previous one; if there was none yet, all begins once more.
-    Confirm,
-    Clear,
-    Fill,
-}
-
-impl ActivationStage {
-    const ALL: [Self; 7] =
-        [Self::Compare, Self::First, Self::Second, Self::Refuse, Self::Confirm, Self::Clear, Self::Fill];
+numbered! {
+    /// Work of a step.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    enum ActivationStage {
+        /// Whether both images are the same, words of them.
+        Compare,
+        /// The first image is checked, or the second.
+        First,
+        Second,
+        /// Neither is a table: the first is checked again, for what is wrong with it.
+        Refuse,
+        /// The result is compared with the previous one; if there was none yet, all begins once more.
+        Confirm,
+        Clear,
+        Fill,
+    }
 }
 
 /// How far an activation is.
@@ -136,8 +133,8 @@ impl Activation {
         let [first, second] = images.words;
         self.taken = self.taken.wrapping_add(1);
         let within = self.taken <= MOST_STEPS;
-        let stage = ActivationStage::ALL.get(self.stage as usize).filter(|_| within).ok_or(ActivateError::Torn)?;
-        match *stage {
+        let stage = ActivationStage::numbered(self.stage).filter(|_| within).ok_or(ActivateError::Torn)?;
+        match stage {
             ActivationStage::Compare => self.compare(first, second),
             ActivationStage::First => match self.check.step(first.as_flattened()) {
                 Ok(true) if self.at == 0 => self.at = 1,
@@ -172,7 +169,7 @@ impl Activation {
             }
             ActivationStage::Confirm => self.confirm()?,
             ActivationStage::Clear | ActivationStage::Fill => {
-                return self.fill(*stage, store, first, second);
+                return self.fill(stage, store, first, second);
             }
         }
         Ok(Progress::Checking)
@@ -282,18 +279,5 @@ impl Activation {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(ActivatedTable { source, id, images, filled, sums });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Activation {
-    drive,
-    temperature,
-    stage,
-    taken,
-    at,
-    same,
-    check,
-    first_refused,
-    found,
-    confirmed
-});
+bits_of!(ActivatedTable { source, id, images, filled, sums });
+bits_of!(Activation { drive, temperature, stage, taken, at, same, check, first_refused, found, confirmed });

@@ -22,35 +22,21 @@ pub struct Counters {
     pub passes: u32,
 }
 
-/// How the table in the store is, as far as it is known.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Health {
-    /// Nothing is known to be wrong.
-    Sound,
-    /// A page of one image is damaged.
-    OneImage,
-    /// A page is damaged in both images: only a new table helps.
-    Lost,
-    /// No table was activated.
-    Empty,
-    /// The store's data on the table is corrupt in both copies: nothing is corrected until the table is activated
-    /// again.
-    Torn,
-}
-
-impl Health {
-    const ALL: [Self; 5] = [Self::Sound, Self::OneImage, Self::Lost, Self::Empty, Self::Torn];
-
-    /// As a number: of telemetry and of the C interface.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// From its number, if it is one.
-    #[must_use]
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.get(code as usize).copied()
+numbered! { coded
+    /// How the table in the store is, as far as it is known.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum Health {
+        /// Nothing is known to be wrong.
+        Sound,
+        /// A page of one image is damaged.
+        OneImage,
+        /// A page is damaged in both images: only a new table helps.
+        Lost,
+        /// No table was activated.
+        Empty,
+        /// The store's data on the table is corrupt in both copies: nothing is corrected until the table is activated
+        /// again.
+        Torn,
     }
 }
 
@@ -101,8 +87,7 @@ impl fmt::Display for ActivateError {
 
 impl core::error::Error for ActivateError {}
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes });
+bits_of!(Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes });
 
 #[cfg(test)]
 mod tests {

@@ -42,15 +42,6 @@ use source::{ACTIVE, Fresh, IN_RANGE, ImageSource, SealedSource, Strangers, TORN
 /// Words of a page.
 const PAGE_WORDS: usize = PAGE_BYTES / 4;
 
-/// Status of the table for a tick.
-#[derive(Clone, Copy)]
-pub(crate) struct TableStatus {
-    /// The store's data on the table is whole.
-    pub whole: bool,
-    /// An image is not the one that was activated.
-    pub other_images: bool,
-}
-
 /// Where the checking of the images is. An upset of it makes a page look damaged until it is checked again.
 #[derive(Clone, Copy, Debug)]
 struct Scrub {
@@ -278,7 +269,7 @@ impl Store {
             }
             found = true;
             let fresh = self.source().fresh(&images.words, place as u32, strangers, self.damaged.pages());
-            let fresh = if place < used { fresh } else { Fresh { place, value: 0, usable: true } };
+            let fresh = if place < used { fresh } else { Fresh { value: 0, usable: true } };
             self.count(fresh.usable);
             if fresh.usable {
                 self.first.set(place, fresh.value);
@@ -376,7 +367,7 @@ impl Store {
     #[inline(always)]
     fn interval(&self, torque: f32, last: usize) -> usize {
         let start = |i: usize| f32::from_bits(u32::from_le_bytes(self.first.0.get(i).copied().unwrap_or([0; 4])));
-        grid::search_64(start, torque).min(last)
+        grid::search([32, 16, 8, 4, 2, 1], start, torque).min(last)
     }
 
     /// Locates a torque, with this added to D and H, counts ([`OperatingPoint::adjusted`]). The same work for all
@@ -428,12 +419,13 @@ impl Store {
         Strangers { any: first | second | once, all: first & second | once }
     }
 
-    /// Table status of a tick, to be read after everything else that the tick reads.
+    /// Whether the store's data on the table is whole, and whether an image is not the one that was activated: to be
+    /// read after everything else that a tick reads.
     #[inline(always)]
-    pub(crate) fn table_status(&self, images: &Images<'_>) -> TableStatus {
+    pub(crate) fn table_status(&self, images: &Images<'_>) -> (bool, bool) {
         let strangers = self.strangers(images);
         let [sealed, _] = &self.source;
-        TableStatus { whole: sealed.is_whole(), other_images: self.is_active() & strangers.any }
+        (sealed.is_whole(), self.is_active() & strangers.any)
     }
 
     /// Makes a word of both copies anew from both images.
@@ -441,10 +433,11 @@ impl Store {
         let used = self.source().used as u32;
         let at = if self.next < used { self.next } else { 0 };
         let fresh = self.source().fresh(&images.words, at, strangers, self.damaged.pages());
-        let ([a], [b]) = (self.first.words::<1>(fresh.place), self.second.words::<1>(fresh.place));
+        let place = at as usize;
+        let ([a], [b]) = (self.first.words::<1>(place), self.second.words::<1>(place));
         if fresh.usable {
-            self.first.set(fresh.place, fresh.value);
-            self.second.set(fresh.place, fresh.value);
+            self.first.set(place, fresh.value);
+            self.second.set(place, fresh.value);
         }
         self.next = at.wrapping_add(1);
         self.counters.passes = self.counters.passes.wrapping_add((at.wrapping_add(1) >= used) as u32);
@@ -555,9 +548,6 @@ impl Store {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Store { first, second, source, next, scrub, damaged, counters, id });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Scrub { second, page, word, crc });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Damaged { pages, again });
+bits_of!(Store { first, second, source, next, scrub, damaged, counters, id });
+bits_of!(Scrub { second, page, word, crc });
+bits_of!(Damaged { pages, again });

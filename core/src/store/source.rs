@@ -144,7 +144,7 @@ impl ImageSource {
         let temperature = num::within(temperature_c, range);
         let [last_temperature, _] = halves(word_at(words, last_at));
         let node = |i: usize| number(word::TEMPERATURE_NODES.wrapping_add(i));
-        let plane = grid::search_8(node, temperature).min(last_temperature);
+        let plane = grid::search([4, 2, 1], node, temperature).min(last_temperature);
         let (cold, hot) = (node(plane), node(plane.wrapping_add(1)));
         let [node_plane, nodes] = halves(word_at(words, nodes_at));
         let [record_plane, records] = halves(word_at(words, records_at));
@@ -205,7 +205,6 @@ impl ImageSource {
 /// A word of the copies, made anew.
 #[derive(Clone, Copy)]
 pub(super) struct Fresh {
-    pub place: usize,
     pub value: u32,
     /// There is something to make it of.
     pub usable: bool,
@@ -257,7 +256,7 @@ impl ImageSource {
         let number = blend_number(cold, hot, self.warm);
         let pair = blend_halves(cold, hot, (self.warm * 16_384.0) as i32);
         let value = pair ^ (pair ^ number) & (is_number as u32).wrapping_neg();
-        Fresh { place: at as usize, value, usable }
+        Fresh { value, usable }
     }
 }
 
@@ -278,8 +277,7 @@ impl SealedSource {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(ImageSource {
+bits_of!(ImageSource {
     plan,
     torque_range,
     warm,
@@ -298,5 +296,4 @@ crate::upset::upsets!(ImageSource {
     seal,
     drive,
 });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(SealedSource { source, sums });
+bits_of!(SealedSource { source, sums });

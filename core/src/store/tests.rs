@@ -848,6 +848,6 @@ fn a_flip_within_a_tick_is_found_in_it() {
         let mut store = world.clone();
         let point = store.locate(5.0, 0, 0);
         store.flip_source(bit);
-        assert!(point.doubt.none() && !store.table_status(&Images::new(&IMAGE, &TWIN)).whole, "{bit}");
+        assert!(point.doubt.none() && !store.table_status(&Images::new(&IMAGE, &TWIN)).0, "{bit}");
     }
 }

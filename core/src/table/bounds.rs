@@ -72,10 +72,8 @@ impl Bounds {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(Bounds { error_rad, periodic_rad, slope, curve_slope, ripple_cells, rounding_rad });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(InverseBound { iterations, error_rad });
+bits_of!(Bounds { error_rad, periodic_rad, slope, curve_slope, ripple_cells, rounding_rad });
+bits_of!(InverseBound { iterations, error_rad });
 
 #[cfg(test)]
 mod tests {

@@ -87,13 +87,6 @@ impl PeriodicAxis {
         self.nodes == 0
     }
 
-    /// Position of node `node` in 2⁻³² of the period, rounded up: the middle of its cell.
-    #[must_use]
-    pub fn node_phase(self, node: usize) -> u32 {
-        let position = ((node as u64) << 32).checked_add(self.nodes.saturating_sub(1) as u64).unwrap_or(0);
-        position.checked_div(self.nodes as u64).unwrap_or(0) as u32
-    }
-
     /// Where `phase` lies. One 32×32 multiplication, no division, no loop over data.
     #[must_use]
     pub const fn locate(self, phase: u32) -> Cell {
@@ -119,8 +112,7 @@ impl PeriodicAxis {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(PeriodicAxis { nodes });
+bits_of!(PeriodicAxis { nodes });
 
 /// A place on a clamped axis: between node `below` and node `above`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -157,27 +149,12 @@ pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f
     ClampedCell { below, above, weight: if above == below { 0.0 } else { weight } }
 }
 
-/// The interval among starts padded to 64 with a larger number that holds `value`: the last start at or below it, or
-/// the first.
+/// The interval that holds `value` among starts padded with a larger number to twice the first of `steps`, which halve
+/// down to 1: the last start at or below it, or the first.
 ///
-/// Six comparisons, whatever the data. As [`locate_clamped`] finds it, for the control step.
-pub(crate) fn search_64(start: impl Fn(usize) -> f32, value: f32) -> usize {
-    let mut found = 0;
-    for step in [32, 16, 8, 4, 2, 1] {
-        let candidate = found | step;
-        found = if start(candidate) <= value { candidate } else { found };
-    }
-    found
-}
-
-/// As [`search_64`], among 8.
-pub(crate) fn search_8(start: impl Fn(usize) -> f32, value: f32) -> usize {
-    let mut found = 0;
-    for step in [4, 2, 1] {
-        let candidate = found | step;
-        found = if start(candidate) <= value { candidate } else { found };
-    }
-    found
+/// One comparison for each step, whatever the data. As [`locate_clamped`] finds it, for the control step.
+pub(crate) fn search<const N: usize>(steps: [usize; N], start: impl Fn(usize) -> f32, value: f32) -> usize {
+    steps.into_iter().fold(0, |found, step| if start(found | step) <= value { found | step } else { found })
 }
 
 /// An interval is a jump when both neighbours (or the only one) are at least this many times as wide.
@@ -222,7 +199,8 @@ mod tests {
         for n in 4..=MAX_PERIODIC_NODES {
             let axis = PeriodicAxis::new(n).unwrap();
             for node in 0..n {
-                let phase = axis.node_phase(node);
+                // The middle of its cell, rounded up.
+                let phase = ((node as u64) << 32).div_ceil(n as u64) as u32;
                 let cell = axis.locate(phase);
                 assert_eq!(axis.around(cell)[1], node, "{n} nodes");
                 assert!((cell.weights()[1] - 0.75).abs() < 1e-6 && (cell.weights()[0] - 0.125).abs() < 1e-6);
@@ -284,7 +262,6 @@ mod tests {
         }
         assert!(PeriodicAxis::new(0).unwrap().is_empty());
         let _ = PeriodicAxis::new(0).unwrap().locate(u32::MAX);
-        assert_eq!(PeriodicAxis::new(0).unwrap().node_phase(3), 0);
     }
 
     proptest! {
@@ -317,10 +294,10 @@ mod tests {
             let inside = nodes[place.below] <= clamped && clamped <= nodes[place.above];
             prop_assert!(inside);
             let start = |i: usize| nodes.get(i).copied().unwrap_or(f32::MAX);
-            let step = search_64(start, clamped).min(nodes.len().saturating_sub(2));
+            let step = search([32, 16, 8, 4, 2, 1], start, clamped).min(nodes.len().saturating_sub(2));
             prop_assert_eq!(step, place.below);
             if nodes.len() <= 8 {
-                prop_assert_eq!(search_8(start, clamped).min(nodes.len().saturating_sub(2)), place.below);
+                prop_assert_eq!(search([4, 2, 1], start, clamped).min(nodes.len().saturating_sub(2)), place.below);
             }
         }
     }

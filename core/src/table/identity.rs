@@ -202,8 +202,7 @@ const fn mix([a, b, c, d]: [u32; 4], x: u32, y: u32) -> [u32; 4] {
     [a, b, c, d]
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(IdentityCheck { block, top, joined, trees });
+bits_of!(IdentityCheck { block, top, joined, trees });
 
 #[cfg(test)]
 mod tests {

@@ -86,8 +86,7 @@ impl PointPlan {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(PointPlan {
+bits_of!(PointPlan {
     ripple_nodes,
     ripple_unit,
     ripple_cells,

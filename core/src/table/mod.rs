@@ -55,34 +55,20 @@ use crate::drive::Drive;
 use bounds::{Bounds, InverseBound};
 use grid::PeriodicAxis;
 
-/// Kind of wave generator, for the record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum GeneratorKind {
-    /// None of the others, or unknown.
-    Other,
-    /// Two rollers.
-    TwoRoller,
-    /// Four rollers.
-    FourRoller,
-    /// Two eccentric discs.
-    DoubleDisc,
-    /// A cam with a flexible bearing.
-    Cam,
-}
-
-impl GeneratorKind {
-    const ALL: [Self; 5] = [Self::Other, Self::TwoRoller, Self::FourRoller, Self::DoubleDisc, Self::Cam];
-
-    /// The code in an image.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// From the code in an image.
-    #[must_use]
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.get(code as usize).copied()
+numbered! { coded
+    /// Kind of wave generator, for the record.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum GeneratorKind {
+        /// None of the others, or unknown.
+        Other,
+        /// Two rollers.
+        TwoRoller,
+        /// Four rollers.
+        FourRoller,
+        /// Two eccentric discs.
+        DoubleDisc,
+        /// A cam with a flexible bearing.
+        Cam,
     }
 }
 

@@ -26,6 +26,7 @@ use crate::drive::Drive;
 use crate::play::{Direction, PlayState};
 
 /// Expected motion of the output.
+#[must_use]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Actual output angle: nominal plus transmission error.
@@ -42,6 +43,7 @@ pub struct Prediction {
 }
 
 /// Command for a wanted output angle.
+#[must_use]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// Generator angle to go to.
@@ -279,7 +281,6 @@ impl<'a> Table<'a> {
     /// Call it once for every measured generator angle, in order: the play lives on the turning points. If torque or
     /// temperature is not finite the answer is `Disabled` with no error, and `state` follows the motion with the
     /// half-width of the last good step.
-    #[must_use]
     pub fn forward(
         &self,
         state: &mut PlayState,
@@ -294,14 +295,12 @@ impl<'a> Table<'a> {
     ///
     /// The top of this module describes the method. If an input is not finite, or the error that it finds lies beyond
     /// the table's limit, the ideal command is given and marked `Disabled`.
-    #[must_use]
     pub fn inverse(&self, target: OutputAngle, torque_n_m: f32, temperature_c: f32, approach: Approach<'_>) -> Command {
         self.model().aim(&read::locate(self, torque_n_m, temperature_c), target, approach)
     }
 
     /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target.
     /// Locates torque and temperature once; the answers are the same.
-    #[must_use]
     pub fn step(
         &self,
         state: &mut PlayState,

@@ -6,33 +6,19 @@ use super::windup;
 #[cfg(test)]
 use crate::angle::RAD_PER_COUNT;
 
-/// How far an answer can be trusted, worst last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Quality {
-    /// Inside the range of the table, side of the play known.
-    InRange,
-    /// The error is known only to within the uncertainty reported: the torque lies inside a jump, or the side of the
-    /// play is not known yet.
-    Uncertain,
-    /// Torque or temperature outside the range the table holds for; the value at its edge is used.
-    Extrapolated,
-    /// An input was not finite, or the table gave a number it cannot give: no correction is made.
-    Disabled,
-}
-
-impl Quality {
-    const ALL: [Self; 4] = [Self::InRange, Self::Uncertain, Self::Extrapolated, Self::Disabled];
-
-    /// As a number: of telemetry and of the C interface.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// From its number, if it is one.
-    #[must_use]
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.get(code as usize).copied()
+numbered! { coded
+    /// How far an answer can be trusted, worst last.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub enum Quality {
+        /// Inside the range of the table, side of the play known.
+        InRange,
+        /// The error is known only to within the uncertainty reported: the torque lies inside a jump, or the side of
+        /// the play is not known yet.
+        Uncertain,
+        /// Torque or temperature outside the range the table holds for; the value at its edge is used.
+        Extrapolated,
+        /// An input was not finite, or the table gave a number it cannot give: no correction is made.
+        Disabled,
     }
 }
 

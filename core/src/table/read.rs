@@ -44,10 +44,12 @@ pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> 
     let [_, record_step] = halves(steps);
 
     let number = |i: usize| f32_at(table.words, i);
-    let interval = grid::search_64(|i| number(word::TORQUE_NODES.wrapping_add(i)), torque).min(last_torque);
+    let interval =
+        grid::search([32, 16, 8, 4, 2, 1], |i| number(word::TORQUE_NODES.wrapping_add(i)), torque).min(last_torque);
     let [low, high] = table.words(word::TORQUE_NODES.wrapping_add(interval), &mut doubt).map(f32::from_bits);
     let temperature = within(temperature_c, [least, most]);
-    let plane = grid::search_8(|i| number(word::TEMPERATURE_NODES.wrapping_add(i)), temperature).min(last_temperature);
+    let plane =
+        grid::search([4, 2, 1], |i| number(word::TEMPERATURE_NODES.wrapping_add(i)), temperature).min(last_temperature);
     let [cold, hot] = table.words(word::TEMPERATURE_NODES.wrapping_add(plane), &mut doubt).map(f32::from_bits);
     let warm = (temperature - cold) / (hot - cold);
 

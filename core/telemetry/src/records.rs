@@ -148,7 +148,6 @@ impl Record {
     }
 
     /// The estimated output.
-    #[must_use]
     pub const fn output(&self) -> OutputAngle {
         OutputAngle::from_counts(self.output_counts)
     }

@@ -80,58 +80,34 @@ const STEP_BYTES: usize = PAGE_BYTES / 2;
 const STEP_NUMBERS: usize = 12;
 const STEP_NODES: usize = 4;
 
-/// Stages of a check, in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum CheckStage {
-    Envelope,
-    Crc,
-    Identity,
-    Pages,
-    Places,
-    TorqueAxis,
-    TemperatureAxis,
-    Unit,
-    Jumps,
-    Nodes,
-    /// Of a record: closed, and how far it narrows the play; then how far each of its two ripples goes.
-    Closed,
-    Narrowest,
-    Forward,
-    Backward,
-    Curves,
-    CurvesClosed,
-    Bounds,
-    Rise,
-    Inverse,
-    /// Words that follow from the bounds.
-    Derived,
-    Done,
-}
-
-impl CheckStage {
-    const ALL: [Self; 21] = [
-        Self::Envelope,
-        Self::Crc,
-        Self::Identity,
-        Self::Pages,
-        Self::Places,
-        Self::TorqueAxis,
-        Self::TemperatureAxis,
-        Self::Unit,
-        Self::Jumps,
-        Self::Nodes,
-        Self::Closed,
-        Self::Narrowest,
-        Self::Forward,
-        Self::Backward,
-        Self::Curves,
-        Self::CurvesClosed,
-        Self::Bounds,
-        Self::Rise,
-        Self::Inverse,
-        Self::Derived,
-        Self::Done,
-    ];
+numbered! {
+    /// Stages of a check, in this order.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    enum CheckStage {
+        Envelope,
+        Crc,
+        Identity,
+        Pages,
+        Places,
+        TorqueAxis,
+        TemperatureAxis,
+        Unit,
+        Jumps,
+        Nodes,
+        /// Of a record: closed, and how far it narrows the play; then how far each of its two ripples goes.
+        Closed,
+        Narrowest,
+        Forward,
+        Backward,
+        Curves,
+        CurvesClosed,
+        Bounds,
+        Rise,
+        Inverse,
+        /// Words that follow from the bounds.
+        Derived,
+        Done,
+    }
 }
 
 /// Facts of an image once its sizes are known.
@@ -225,7 +201,7 @@ impl ImageCheck {
 
     /// The stage; the first for one that there is not, and then the checksum does not match.
     fn stage(&self) -> CheckStage {
-        CheckStage::ALL.get(self.stage as usize).copied().unwrap_or(CheckStage::Envelope)
+        CheckStage::numbered(self.stage).unwrap_or(CheckStage::Envelope)
     }
 
     /// A step among the numbers; the next stage if this one has ended.
@@ -282,29 +258,21 @@ impl ImageCheck {
                 })
             }
             CheckStage::Closed => {
-                if self.closed(words)? {
-                    self.next_part(CheckStage::Narrowest);
-                }
-                None
+                let ended = self.closed(words)?;
+                self.next_part(ended, CheckStage::Narrowest)
             }
             CheckStage::Narrowest => {
-                if self.narrowest(words)? {
-                    self.next_part(CheckStage::Forward);
-                }
-                None
+                let ended = self.narrowest(words)?;
+                self.next_part(ended, CheckStage::Forward)
             }
             CheckStage::Forward => {
-                if self.ripple(words) {
-                    self.next_part(CheckStage::Backward);
-                }
-                None
+                let ended = self.ripple(words);
+                self.next_part(ended, CheckStage::Backward)
             }
             CheckStage::Backward => {
                 let ended = self.ripple(words);
-                if ended {
-                    self.next_part(CheckStage::Closed);
-                    self.at = self.at.saturating_add(1);
-                }
+                self.at = self.at.saturating_add(ended as usize);
+                self.next_part(ended, CheckStage::Closed);
                 (ended && self.at >= records).then_some(CheckStage::Curves)
             }
             CheckStage::Curves => self.curve(words)?,
@@ -335,10 +303,13 @@ impl ImageCheck {
         })
     }
 
-    /// Goes on with another part of the same record.
-    fn next_part(&mut self, stage: CheckStage) {
-        self.stage = stage as u32;
-        self.within = 0;
+    /// Where one has ended goes on with another part of the same record or curve.
+    #[inline(never)]
+    fn next_part(&mut self, ended: bool, stage: CheckStage) -> Option<CheckStage> {
+        if ended {
+            (self.stage, self.within) = (stage as u32, 0);
+        }
+        None
     }
 
     /// Takes some bytes into the CRC-32 of all, and compares it after the last.
@@ -596,10 +567,7 @@ impl ImageCheck {
             in_range(field, index, curve_rad(words, at.saturating_add(index)), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
         }
         self.within = end;
-        if end >= stored {
-            self.next_part(CheckStage::CurvesClosed);
-        }
-        Ok(None)
+        Ok(self.next_part(end >= stored, CheckStage::CurvesClosed))
     }
 
     /// Whether it is closed, and, some at a time, what it can give.
@@ -618,7 +586,7 @@ impl ImageCheck {
         if self.extremes(words, stored) {
             self.facts.add_curve(self.at, self.most);
             self.most = [0.0; 3];
-            self.next_part(CheckStage::Curves);
+            self.next_part(true, CheckStage::Curves);
             self.at = self.at.saturating_add(1);
         }
         Ok(None)
@@ -846,10 +814,8 @@ impl<'a> Table<'a> {
     }
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(ImageCheck { stage, at, within, crc, facts, before, highest, most, least });
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(ImageFacts {
+bits_of!(ImageCheck { stage, at, within, crc, facts, before, highest, most, least });
+bits_of!(ImageFacts {
     body_bytes,
     drive,
     generator_kind,

@@ -124,8 +124,7 @@ pub fn plan_of(torque: usize, temperature: usize, ripple: usize, curves: [usize;
     (layout.plan(torque, temperature, ripple, curves), layout.end as u32)
 }
 
-#[cfg(any(test, feature = "testing"))]
-crate::upset::upsets!(ImageLayout { curves, nodes, node_plane, records, record, end });
+bits_of!(ImageLayout { curves, nodes, node_plane, records, record, end });
 
 /// Width of a cell of the ripple at the output, counts.
 pub fn cell_width(drive: &Drive, ripple_nodes: usize) -> f32 {

@@ -87,7 +87,7 @@ fn what_is_written_is_read_back() {
             let half = point.half_width as f32 * RAD_PER_COUNT;
             assert!((half - at(data().half_width_rad)).abs() < 2.0 * count);
             for node in 0..8 {
-                let phase = table.ripple_axis().node_phase(node);
+                let phase = ((node as u64) << 32).div_ceil(8) as u32;
                 let phases = Phases { generator: 0, material: 0, output: 0, tooth: phase };
                 let play = play_at(&table, &point, phases, &mut Default::default());
                 let ripple = |values: &[f32]| {
