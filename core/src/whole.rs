@@ -256,13 +256,20 @@ impl<T: Words> Sealed<T> {
     /// The kept value, mended if it has to be; `None` if it is lost.
     #[inline(always)]
     pub fn open(&self) -> Option<T> {
-        if self.is_whole() { Some(self.kept) } else { self.mended() }
+        self.with(|kept| *kept)
     }
 
     /// Looks at what is kept, mended if it has to be; `None` if it is lost.
     #[inline(always)]
     pub fn with<R>(&self, look: impl FnOnce(&T) -> R) -> Option<R> {
-        if self.is_whole() { Some(look(&self.kept)) } else { self.mended().map(|kept| look(&kept)) }
+        let mended;
+        let kept = if self.is_whole() {
+            &self.kept
+        } else {
+            mended = self.mended()?;
+            &mended
+        };
+        Some(look(kept))
     }
 
     /// Changes what is kept, where it lies, mended if it has to be; `None`, and nothing is changed, if it is lost.
