@@ -86,7 +86,7 @@ const LEAST_BORNE_OUT_MM: f64 = 43.0;
 
 impl Caution {
     /// That the stiffness is not that of cups that are sold, and by how much, as measured of the sizes of a catalogue
-    /// (docs/evidence/catalogue.md); where a sheet stands beside the figures, their ratio says it.
+    /// (`tests/evidence catalogue`); where a sheet stands beside the figures, their ratio says it.
     pub fn of_stiffness(drive: &Drive, has_sheet: bool) -> Option<Caution> {
         let ratio = drive.ratio() - 1.0;
         let [least, most] = BORNE_OUT_RATIOS;
