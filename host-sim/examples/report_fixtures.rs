@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use flexspline_report::Packed;
 use flexspline_report::page::{
-    ChartAxis, ChartSeries, Choice, Detail, FieldMap, Figure, FigureBody, Headline, Limit, Lines, Mark, Page,
-    PageBlock, PageQuantity, PageSection, PageTable, RichText, Status, Upright,
+    ChartAxis, ChartSeries, Choice, FieldMap, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageBlock,
+    PageQuantity, PageSection, PageTable, RichText, Status, Upright,
 };
 use serde_json::{Map, Value, json};
 
@@ -104,7 +104,7 @@ fn hostile() -> Page {
         sections: vec![PageSection {
             id: "section".into(),
             title: HOSTILE.into(),
-            detail: Detail::Summary,
+            folded: false,
             blocks: vec![
                 PageBlock::Paragraph { choice: None, text: RichText::new(HOSTILE).strong(HOSTILE) },
                 PageBlock::Table { choice: None, table },

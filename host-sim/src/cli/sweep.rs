@@ -12,7 +12,7 @@ use flexspline_base::output::Outputs;
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
 use flexspline_design::sweep::{
     Constraint, EXAMPLE, Judge, NUMBER, OfGenerator, PlanError, PlanSettings, Ran, ReducedSweep, RunStatus, Sense,
-    Shard, Tolerances, VariantPlan, Vary, is_error_of_making, reduce, run,
+    Shard, Tolerances, VariantPlan, VariantRow, Vary, is_error_of_making, reduce, run,
 };
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_report::page::{Headline, Page};
