@@ -304,7 +304,6 @@ impl ImageCheck {
     }
 
     /// Where one has ended goes on with another part of the same record or curve.
-    #[inline(never)]
     fn next_part(&mut self, ended: bool, stage: CheckStage) -> Option<CheckStage> {
         if ended {
             (self.stage, self.within) = (stage as u32, 0);
