@@ -277,10 +277,8 @@ impl JointSettings {
         };
         let fade_step = if fade == 0 { 0.0 } else { 1.0 / fade as f32 };
         // A whole number of fine counts, no less than one and no more than asked for otherwise.
-        let most = i32::MAX as f32 / 4.0;
-        let acceleration = if acceleration < most { acceleration } else { most } as i32;
-        let acceleration = if acceleration < 1 { 1 } else { acceleration };
-        let rate = if rate < 1.0 { 1 } else { rate as i32 };
+        let acceleration = within(acceleration as i32, 1, 1 << 29);
+        let rate = within(rate as i32, 1, i32::MAX);
         let hold = hold as i32;
         // One tick more can still be counted.
         let debounce_ticks = if debounce_ticks == u16::MAX { debounce_ticks.wrapping_sub(1) } else { debounce_ticks };

@@ -256,11 +256,12 @@ impl Default for JointState {
 impl JointState {
     /// Bytes of a saved state.
     pub const SAVED_BYTES: usize = 72;
+    const NEW: [SealedState; 2] = [Kept::NEW.sealed(); 2];
 
     /// After a reset: no correction, the side of the play unknown, off.
     #[must_use]
     pub const fn new() -> Self {
-        Self { copies: [Kept::NEW.sealed(); 2], missed_ticks: 0 }
+        Self { copies: Self::NEW, missed_ticks: 0 }
     }
 
     /// Values of the copy that is whole.

@@ -235,8 +235,7 @@ impl ImageCheck {
             }
             CheckStage::Jumps => {
                 let node = |i: usize| f32_at(words, word::TORQUE_NODES.saturating_add(i));
-                let part = STEP_NUMBERS;
-                let (from, to) = (self.at, self.at.saturating_add(part).min(self.facts.torque_nodes));
+                let (from, to) = (self.at, self.at.saturating_add(STEP_NUMBERS).min(self.facts.torque_nodes));
                 for i in from..to {
                     let jump = grid::jump_at(i, self.facts.torque_nodes, node);
                     self.facts.jumps |= (jump as u64).wrapping_shl(i as u32);
@@ -258,21 +257,29 @@ impl ImageCheck {
                 })
             }
             CheckStage::Closed => {
-                let ended = self.closed(words)?;
-                self.next_part(ended, CheckStage::Narrowest)
+                if self.closed(words)? {
+                    self.next_part(CheckStage::Narrowest);
+                }
+                None
             }
             CheckStage::Narrowest => {
-                let ended = self.narrowest(words)?;
-                self.next_part(ended, CheckStage::Forward)
+                if self.narrowest(words)? {
+                    self.next_part(CheckStage::Forward);
+                }
+                None
             }
             CheckStage::Forward => {
-                let ended = self.ripple(words);
-                self.next_part(ended, CheckStage::Backward)
+                if self.ripple(words) {
+                    self.next_part(CheckStage::Backward);
+                }
+                None
             }
             CheckStage::Backward => {
                 let ended = self.ripple(words);
-                self.at = self.at.saturating_add(ended as usize);
-                self.next_part(ended, CheckStage::Closed);
+                if ended {
+                    self.next_part(CheckStage::Closed);
+                    self.at = self.at.saturating_add(1);
+                }
                 (ended && self.at >= records).then_some(CheckStage::Curves)
             }
             CheckStage::Curves => self.curve(words)?,
@@ -303,13 +310,10 @@ impl ImageCheck {
         })
     }
 
-    /// Where one has ended goes on with another part of the same record or curve.
-    #[inline(never)]
-    fn next_part(&mut self, ended: bool, stage: CheckStage) -> Option<CheckStage> {
-        if ended {
-            (self.stage, self.within) = (stage as u32, 0);
-        }
-        None
+    /// Goes on with another part of the same record.
+    fn next_part(&mut self, stage: CheckStage) {
+        self.stage = stage as u32;
+        self.within = 0;
     }
 
     /// Takes some bytes into the CRC-32 of all, and compares it after the last.
@@ -567,7 +571,10 @@ impl ImageCheck {
             in_range(field, index, curve_rad(words, at.saturating_add(index)), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
         }
         self.within = end;
-        Ok(self.next_part(end >= stored, CheckStage::CurvesClosed))
+        if end >= stored {
+            self.next_part(CheckStage::CurvesClosed);
+        }
+        Ok(None)
     }
 
     /// Whether it is closed, and, some at a time, what it can give.
@@ -586,7 +593,7 @@ impl ImageCheck {
         if self.extremes(words, stored) {
             self.facts.add_curve(self.at, self.most);
             self.most = [0.0; 3];
-            self.next_part(true, CheckStage::Curves);
+            self.next_part(CheckStage::Curves);
             self.at = self.at.saturating_add(1);
         }
         Ok(None)
