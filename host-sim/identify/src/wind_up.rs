@@ -167,7 +167,7 @@ mod tests {
         const STIFF: f64 = 3e-5;
         let spring = SlipSpring { width_n_m: 4.0, gain_rad_per_n_m: -8e-6 };
         let with = Hysteresis { gain_rad_per_n_m: 1e-6, springs: vec![spring] };
-        let step = 0.01;
+        let step: f64 = 0.01;
         let path = [30.0, -30.0, 12.0, 2.0].windows(2).flat_map(|ends| {
             let steps = ((ends[1] - ends[0]) / step).abs();
             (0..steps as usize).map(|k| ends[0] + (ends[1] - ends[0]) * k as f64 / steps).collect::<Vec<f64>>()

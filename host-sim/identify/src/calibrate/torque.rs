@@ -1,5 +1,5 @@
-//! How good a torque from the wind-up would be: in rows that took no part in the fit; with a hysteresis by load where it
-//! is better so.
+//! How good a torque from the wind-up would be: in rows that took no part in the fit. With a hysteresis by load where
+//! that gains.
 
 use std::path::Path;
 
@@ -46,12 +46,13 @@ pub struct WindUpTorque {
     pub hysteresis: Option<Hysteresis>,
 }
 
-/// What the springs hold in a row by the torque recorded, over what each can.
+/// A number for each spring.
 type Held = [f64; SLIPS.len()];
 
 /// A fit to all folds but one: zeros of the logs, the model, and what goes in addition.
 type FitWithout = (Vec<f64>, Model, Hysteresis);
 
+/// What the springs hold in each row by the torque recorded, over what each can.
 fn held_by(rows: &[Row], widths_n_m: Held) -> Vec<Held> {
     let (mut held, mut log) = (HeldTorques::default(), 0);
     let of_row = |row: &Row| {
