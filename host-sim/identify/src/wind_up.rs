@@ -5,9 +5,9 @@
 //! h(T) = g₀·T + Σ gᵢ·clamp(zᵢ + ν·(T − T₀), −wᵢ, wᵢ)    zᵢ: what the springs held under the load T₀ before
 //! ```
 //! `s` from −1 to 1 is where the output rests inside its play. It follows the generator by the play operator of the
-//! core, under the torques found before, as the springs of the [hysteresis](Hysteresis) do: to a share `ν` of the newest,
-//! as a spring that sticks would take the noise of a row for a load. The error rises with `T`, so that narrowing finds
-//! it. Where it leaps, inside a dead zone, the torque is known to its ends.
+//! core, under the torques found before, as the springs of the [hysteresis](Hysteresis) do: with a share `ν` of the
+//! newest, as a spring that sticks would take the noise of a row for a load. The error rises with `T`, so that
+//! narrowing finds it. Where it leaps, inside a dead zone, the torque is known to its ends.
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Table};
 use flexspline_design::tables::SlipSpring;
@@ -119,12 +119,12 @@ impl<'t> WindUpCurve<'t> {
             let error = self.table.steady_error_rad(generator, torque_n_m as f32, temperature_c as f32, way);
             error.map_or(f64::NAN, f64::from)
         };
-        let [forward, backward] =
-            [Direction::Forward, Direction::Backward].map(|way| steady(self.held.torque_n_m, way));
+        let before = self.held.torque_n_m;
+        let [forward, backward] = [Direction::Forward, Direction::Backward].map(|way| steady(before, way));
         if !(error_rad + forward + backward + half_width_rad).is_finite() {
             return [f64::NAN; 3];
         }
-        let _ = self.table.forward(&mut self.play, generator, self.held.torque_n_m as f32, temperature_c as f32);
+        let _ = self.table.forward(&mut self.play, generator, before as f32, temperature_c as f32);
         let half = 0.5 * (backward - forward).abs().max(f64::MIN_POSITIVE);
         let (offset, doubt) = (f64::from(self.play.offset_rad()), f64::from(self.play.uncertainty_rad()));
         let range = self.table.torque_range_n_m().map(f64::from);
@@ -167,7 +167,7 @@ mod tests {
         const STIFF: f64 = 3e-5;
         let spring = SlipSpring { width_n_m: 4.0, gain_rad_per_n_m: -8e-6 };
         let with = Hysteresis { gain_rad_per_n_m: 1e-6, springs: vec![spring] };
-        let step = 0.01;
+        let step: f64 = 0.01;
         let path = [30.0, -30.0, 12.0, 2.0].windows(2).flat_map(|ends| {
             let steps = ((ends[1] - ends[0]) / step).abs();
             (0..steps as usize).map(|k| ends[0] + (ends[1] - ends[0]) * k as f64 / steps).collect::<Vec<f64>>()

@@ -1,5 +1,5 @@
 //! How good a torque from the wind-up would be: in rows that took no part in the fit. With a hysteresis by load where
-//! torques are better with it.
+//! that gains.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use super::folds::{Folds, Row};
 use super::parts::State;
 use super::prior::Prior;
 use super::rows::{FoldKind, Rows};
-use super::{LEAST_GAIN, Model};
+use super::{LEAST_GAIN, Model, ROUNDING_ARCSEC};
 use crate::linear::{self, Gram, solve};
 use crate::measurement::quantile_of;
 use crate::wind_up::{HeldTorques, Hysteresis, load_of};
@@ -49,15 +49,10 @@ pub struct WindUpTorque {
 /// A number for each spring.
 type Held = [f64; SLIPS.len()];
 
-/// A fit to all folds but one.
-struct Fit {
-    /// Of the output in each log.
-    zeros: Vec<f64>,
-    model: Model,
-    hysteresis: Hysteresis,
-}
+/// A fit to all folds but one: zeros of the logs, the model, and what goes in addition.
+type FitWithout = (Vec<f64>, Model, Hysteresis);
 
-/// What springs hold in each row by the torque recorded, over what each can.
+/// What the springs hold in each row by the torque recorded, over what each can.
 fn held_by(rows: &[Row], widths_n_m: Held) -> Vec<Held> {
     let (mut held, mut log) = (HeldTorques::default(), 0);
     let of_row = |row: &Row| {
@@ -70,47 +65,42 @@ fn held_by(rows: &[Row], widths_n_m: Held) -> Vec<Held> {
     rows.iter().map(of_row).collect()
 }
 
-/// Hysteresis in what a model leaves of the rows of some folds, each log with a zero of its own. The output lags: a
-/// spring with which it would lead is left out.
+/// Hysteresis in what a model leaves of some rows, each log with a zero of its own. The output lags: a spring with
+/// which it would lead gets nothing.
 fn hysteresis_in(
     rows: &[Row],
     held: &[Held],
     widths_n_m: Held,
-    left_arcsec: impl Fn(&Row) -> Option<f64>,
+    left: impl Fn(&Row) -> Option<f64>,
 ) -> Option<Hysteresis> {
+    const SPRINGS: usize = SLIPS.len();
     let logs = rows.iter().map(|row| row.at.log + 1).max()?;
-    let most_n_m = widths_n_m[SLIPS.len() - 1] / SLIPS[SLIPS.len() - 1];
-    let mut gram = Gram::none(logs + SLIPS.len() + 2);
+    let most_n_m = widths_n_m[SPRINGS - 1] / SLIPS[SPRINGS - 1];
+    let mut gram = Gram::none(logs + SPRINGS + 2);
     let mut x = vec![0.0; gram.size];
     for (row, held) in rows.iter().zip(held) {
-        let Some(left) = left_arcsec(row) else { continue };
-        x.fill(0.0);
+        let Some(left) = left(row) else { continue };
+        x[..logs].fill(0.0);
         x[row.at.log] = 1.0;
         x[logs] = row.at.torque_n_m / most_n_m;
-        x[logs + 1..][..SLIPS.len()].copy_from_slice(held);
-        x[logs + 1 + SLIPS.len()] = left;
+        x[logs + 1..][..SPRINGS].copy_from_slice(held);
+        x[logs + 1 + SPRINGS] = left;
         gram.add_row(&x, 1.0);
     }
     let gram = gram.among(&(0..gram.size).collect::<Vec<usize>>());
     let mut priors = vec![linear::Prior { mean: 0.0, std: ANY_ARCSEC }; gram.size - 1];
+    let gain = |arcsec: f64, n_m: f64| arcsec / ARCSEC_PER_RAD / n_m;
     loop {
         let found = solve(&gram, &priors, 1.0)?.coefficients;
         let leads = (logs + 1..found.len()).filter(|k| priors[*k].std > 0.0 && found[*k] > 0.0);
-        match leads.max_by(|a, b| found[*a].total_cmp(&found[*b])) {
-            Some(leads) => priors[leads].std = 0.0,
-            None => {
-                let by = |arcsec: f64, n_m: f64| arcsec / ARCSEC_PER_RAD / n_m;
-                let springs = widths_n_m.iter().zip(&found[logs + 1..]);
-                let spring = |(width_n_m, arcsec): (&f64, &f64)| SlipSpring {
-                    width_n_m: *width_n_m,
-                    gain_rad_per_n_m: by(*arcsec, *width_n_m),
-                };
-                return Some(Hysteresis {
-                    gain_rad_per_n_m: by(found[logs], most_n_m),
-                    springs: springs.map(spring).collect(),
-                });
-            }
+        if let Some(most) = leads.max_by(|a, b| found[*a].total_cmp(&found[*b])) {
+            priors[most].std = 0.0;
+            continue;
         }
+        let springs = widths_n_m.iter().zip(&found[logs + 1..]);
+        let springs =
+            springs.map(|(of, arcsec)| SlipSpring { width_n_m: *of, gain_rad_per_n_m: gain(*arcsec, *of).min(0.0) });
+        return Some(Hysteresis { gain_rad_per_n_m: gain(found[logs], most_n_m), springs: springs.collect() });
     }
 }
 
@@ -133,48 +123,44 @@ impl WindUpTorque {
         let all = folds.all();
         let widths_n_m = SLIPS.map(|share| share * low.abs().max(high.abs()));
         let held = held_by(&rows.rows, widths_n_m);
-        let fit_without = |fold: Option<usize>, springs: bool| {
+        let fit_without = |fold: Option<usize>, springs: bool| -> Option<FitWithout> {
             let others: Vec<usize> = all.iter().copied().filter(|other| Some(*other) != fold).collect();
             let mut zeros = folds.fit(&others, &model.chosen, &[])?;
             let coefficients = zeros.split_off(zeros.len() - model.coefficients.len());
             let model = Model { coefficients, ..model.clone() };
-            let left = |row: &Row| row.left_arcsec - model.adds_arcsec(&row.at);
-            let of_others = |row: &Row| (Some(row.fold) != fold).then(|| left(row));
+            let left = |row: &Row| (Some(row.fold) != fold).then(|| row.left_arcsec - model.adds_arcsec(&row.at));
             let hysteresis =
-                if springs { hysteresis_in(&rows.rows, &held, widths_n_m, of_others)? } else { Hysteresis::default() };
-            Some(Fit { zeros, model, hysteresis })
+                if springs { hysteresis_in(&rows.rows, &held, widths_n_m, left)? } else { Hysteresis::default() };
+            Some((zeros, model, hysteresis))
         };
         let judged = |springs: bool| {
             let fits = (0..=*all.last()?).map(|fold| fit_without(Some(fold), springs)).collect::<Option<Vec<_>>>()?;
             Some(Self::judged(rows, &held, &fits, range, prior))
         };
-        let [without, with] = [false, true].map(judged);
-        let gains = |with: &Self, without: &Self| with.rms_n_m.powi(2) < (1.0 - LEAST_GAIN) * without.rms_n_m.powi(2);
-        match (without?, with) {
-            (without, Some(with)) if gains(&with, &without) => {
-                let mut hysteresis = fit_without(None, true)?.hysteresis;
-                hysteresis.springs.retain(|spring| spring.gain_rad_per_n_m < 0.0);
-                Some(Self { hysteresis: Some(hysteresis), ..with })
-            }
-            (without, _) => Some(without),
-        }
+        let without = judged(false)?;
+        let gains = |with: &Self| with.rms_n_m.powi(2) < (1.0 - LEAST_GAIN) * without.rms_n_m.powi(2);
+        let Some(with) = judged(true).filter(gains) else { return Some(without) };
+        let (.., mut hysteresis) = fit_without(None, true)?;
+        let holds_arcsec = |of: &SlipSpring| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD;
+        hysteresis.springs.retain(|spring| holds_arcsec(spring) > ROUNDING_ARCSEC);
+        Some(Self { hysteresis: Some(hysteresis), ..with })
     }
 
     /// Of fits, each without the fold of its place, in the order of the rows: springs go by the torques found.
-    fn judged(rows: &Rows, held: &[Held], fits: &[Fit], range: [f64; 2], prior: &Prior<'_>) -> Self {
+    fn judged(rows: &Rows, held: &[Held], fits: &[FitWithout], range: [f64; 2], prior: &Prior<'_>) -> Self {
         // A log that was left out whole has its zero from nowhere else.
         let own_zero = |log: usize| {
             let of_log = rows.rows.iter().zip(held).filter(|(row, _)| row.at.log == log);
             let left = of_log.map(|(row, held)| {
-                let Fit { model, hysteresis, .. } = &fits[row.fold];
+                let (_, model, hysteresis) = &fits[row.fold];
                 let springs = hysteresis.springs.iter().zip(held);
-                let load = hysteresis.gain_rad_per_n_m * row.at.torque_n_m;
-                let of_load = springs.fold(load, |sum, (of, share)| sum + of.gain_rad_per_n_m * of.width_n_m * share);
+                let springs = springs.map(|(of, share)| of.gain_rad_per_n_m * of.width_n_m * share).sum::<f64>();
+                let of_load = hysteresis.gain_rad_per_n_m * row.at.torque_n_m + springs;
                 row.left_arcsec - model.adds_arcsec(&row.at) - ARCSEC_PER_RAD * of_load
             });
             mean(&left.collect::<Vec<f64>>())
         };
-        let zeros: Vec<f64> = match rows.folds {
+        let own_zeros: Vec<f64> = match rows.folds {
             FoldKind::Files => (0..rows.means_arcsec.len()).map(own_zero).collect(),
             FoldKind::Blocks => Vec::new(),
         };
@@ -184,17 +170,17 @@ impl WindUpTorque {
             if row.at.log != log {
                 (now, log) = (HeldTorques::default(), row.at.log);
             }
-            let fit = &fits[row.fold];
+            let (zeros, model, hysteresis) = &fits[row.fold];
             let says = |torque_n_m: f64| {
-                fit.model.says_arcsec(&State { torque_n_m, ..row.at }, prior)
-                    + ARCSEC_PER_RAD * fit.hysteresis.error_rad(&now, torque_n_m)
+                model.says_arcsec(&State { torque_n_m, ..row.at }, prior)
+                    + ARCSEC_PER_RAD * hysteresis.error_rad(&now, torque_n_m)
             };
-            let zero = zeros.get(log).unwrap_or(&fit.zeros[log]);
+            let zero = own_zeros.get(log).unwrap_or_else(|| &zeros[log]);
             let error = prior.steady_arcsec(&row.at) + row.left_arcsec - zero;
             let torque = load_of(says, range, error);
             off.push(torque - row.at.torque_n_m);
             left.push((row.fold, (error - says(row.at.torque_n_m)).abs()));
-            now.follow(torque, fit.hysteresis.springs.iter().map(|spring| spring.width_n_m));
+            now.follow(torque, hysteresis.springs.iter().map(|spring| spring.width_n_m));
         }
         let half_width = |fold: usize| {
             let others = left.iter().filter(|(other, _)| *other != fold);
