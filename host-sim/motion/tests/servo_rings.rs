@@ -82,7 +82,7 @@ fn knocked(
     for _ in 0..(seconds / 0.1).round() as usize {
         let mut most = 0.0_f64;
         for _ in 0..100 {
-            servo.read(plant.angle_rad[0], plant.rate_rad_s[0]);
+            let _ = servo.read(plant.angle_rad[0], plant.rate_rad_s[0]);
             let correction = fed_back(path, &mut filtered, &plant) * RATIO;
             let fed = path.is_some_and(|path| path.rate_fed_forward);
             let asked = ServoCommand {
