@@ -247,11 +247,11 @@ fn logs_of_other_starts_make_one_table() {
         let three = calibrated("a.csv b.csv c.csv", "--ratio 100");
         check(&three, &[("b.csv", 0.381), ("c.csv", 0.617)]);
         assert!(three["held_out"]["rms_after_arcsec"].as_f64().unwrap() < 4.0, "{three}");
-        // The hysteresis of 10 arcsec is in no table.
+        // The hysteresis of 10 arcsec is in no table. Measured: 1.15 to 1.25 N.m without its springs, 0.66 with them.
         let torque = &three["torque_from_wind_up"];
         println!("{torque}");
         let number = |key: &str| torque[key].as_f64().unwrap();
-        assert!(number("rms_n_m") < 0.04 * 40.0 && number("bias_n_m").abs() < 0.2, "{torque}");
+        assert!(number("rms_n_m") < 0.02 * 40.0 && number("bias_n_m").abs() < 0.2, "{torque}");
         assert!((0.93..=0.97).contains(&number("inside")), "{torque}");
         // By `replay`, from a log of a later day, which starts as the second does.
         let replayed = |log: &str| -> Vec<[f64; 4]> {
@@ -272,7 +272,7 @@ fn logs_of_other_starts_make_one_table() {
             let rms = (rows.iter().map(|[is, said, ..]| (said - is).powi(2)).sum::<f64>() / count).sqrt();
             let inside = rows.iter().filter(|[is, _, low, high]| (low..=high).contains(&is)).count() as f64 / count;
             println!("{log}: {rms:.3} N.m rms, {inside:.3} inside");
-            assert!(rms < 0.04 * 40.0 && (0.93..=0.97).contains(&inside), "{log}: {rms} {inside}");
+            assert!(rms < 0.02 * 40.0 && (0.93..=0.97).contains(&inside), "{log}: {rms} {inside}");
         }
         std::fs::create_dir_all(desk.path("known")).unwrap();
         std::fs::copy(desk.path("out/calibrated.fxt"), desk.path("known/cam.fxt")).unwrap();
