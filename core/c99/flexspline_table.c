@@ -1742,6 +1742,8 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
 /* Samples in a row that were believed: with the second there is a way in a tick, with the third a change of it. */
 #define HAS_STEP 2u
 #define HAS_BEND 3u
+/* Most ticks without a sample that are counted. */
+#define MOST_GAP 15u
 /* Without a given acceleration a sample that is out and back is taken back where it needs full speed in less than 2^6 ticks. */
 #define SPIKE_SHIFT 6u
 
@@ -1892,8 +1894,9 @@ static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
     const int64_t sample = present ? input->generator : now->generator, way = minus(sample, now->generator);
     const int32_t step = i32((uint32_t)way), bend = saturate((int64_t)step - now->step), size = bend_size(bend);
     const int32_t largest_bend = now->largest_bend > noise ? now->largest_bend : noise, spike = now->spike > noise ? now->spike : noise;
-    /* As far as it may in each tick since the last. */
-    const uint64_t most = (uint64_t)(uint32_t)now->largest_move * (input->missed_ticks + 1u);
+    /* As far as it may in each tick since the last sample. */
+    const uint32_t gap = now->gap + input->missed_ticks + 1u, most_gap = gap < MOST_GAP ? gap : MOST_GAP;
+    const uint64_t most = (uint64_t)(uint32_t)now->largest_move * gap;
     const bool wide = way != step, far = was_sampled && size_of(way) > most;
     /* The way of a tick that came late is that of several. */
     const uint32_t row = present && input->missed_ticks == 0u ? now->in_a_row : 0u;
@@ -1920,6 +1923,7 @@ static judged judge(fxt_joint *now, const fxt_input *input, int32_t noise)
     /* One sample or two may each look like motion and be wrong. */
     now->unseen = (uint16_t)(in_a_row >= HAS_BEND ? 0u : unseen);
     now->in_a_row = (uint8_t)(is.forgotten ? 0u : in_a_row);
+    now->gap = (uint8_t)(present ? 0u : most_gap);
     now->step = is.back ? add(shifted(step, 1u), shifted(now->step, 1u)) : step;
     now->bend = is.back ? 0 : bend;
     return is;

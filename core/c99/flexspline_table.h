@@ -305,6 +305,7 @@ typedef struct fxt_joint {
     uint16_t unseen;                                     /* ticks since three samples in a row were believed */
     fxt_mode mode;
     uint8_t flank, flank_before, sampled, hold_late, in_a_row;
+    uint8_t gap;                                         /* ticks in a row without a sample, those missed among them; up to 15 */
 } fxt_joint;
 
 /** One tick's measurements. */

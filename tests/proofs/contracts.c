@@ -198,6 +198,7 @@ static fxt_joint any_joint(int32_t size)
     joint.bend = nondet_int();
     joint.in_a_row = (uint8_t)nondet_uint();
     joint.unseen = (uint16_t)nondet_uint();
+    joint.gap = (uint8_t)nondet_uint();
     joint.generator = nondet_long();
     joint.hold_late = nondet_bool() ? 1u : 0u;
     joint.sampled = nondet_bool() ? 1u : 0u;
@@ -316,13 +317,14 @@ void a_sample_moves_no_further_than_a_tick_allows_or_is_doubted(void)
     input.missed_ticks = (uint16_t)nondet_uint();
     const judged is = judge(&joint, &input, nondet_int());
     const int64_t way = minus(joint.generator, before.generator);
-    const uint64_t most = (uint64_t)(uint32_t)before.largest_move * (input.missed_ticks + 1u);
+    const uint64_t most = (uint64_t)(uint32_t)before.largest_move * (before.gap + input.missed_ticks + 1u);
     PROMISE(size_of(way) <= most || before.glitches >= before.patience || is.back || before.sampled == 0u);
     PROMISE(joint.generator == before.generator || (input.has_generator && joint.generator == input.generator));
     PROMISE(joint.glitches <= joint.patience && (!is.good || joint.sampled != 0u) && is.good == (input.has_generator && !is.glitch));
     /* Only after three in a row that were believed, and within a turn, is the one before taken back. */
     PROMISE(!is.back || (before.in_a_row >= HAS_BEND && is.good && input.missed_ticks == 0u && way >= INT32_MIN && way <= INT32_MAX));
     PROMISE(joint.in_a_row <= HAS_BEND && (is.good || joint.in_a_row == 0u));
+    PROMISE(joint.gap <= MOST_GAP && (joint.gap != 0u) == !input.has_generator);
     END;
 }
 

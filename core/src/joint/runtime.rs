@@ -33,7 +33,8 @@ use super::mode::Overrun;
 use super::signals::{Flags, Input, Output};
 use super::state::{
     BEND_TO_SIGN, CopyStatus, FINE, FIRST_IN_A_ROW, FLANK, FLANK_BACKWARD, FLANK_BEFORE, FLANK_FORWARD, FLANK_SHIFT,
-    IN_A_ROW, JointState, Kept, LastSamples, MENDED, MODE, SAMPLED, SEEN, STEP_TO_SIGN, UNSEEN, UNSEEN_SHIFT,
+    GAP, GAP_SHIFT, IN_A_ROW, JointState, Kept, LastSamples, MENDED, MODE, SAMPLED, SEEN, STEP_TO_SIGN, UNSEEN,
+    UNSEEN_SHIFT,
 };
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
@@ -462,10 +463,11 @@ impl JointSettings {
         // Zero where the way fits 32 bits.
         let wide = (way >> 32) as i32 ^ all(step);
         let wide = wide | wide.wrapping_neg();
-        // Outside ± the largest move in each tick since the last, which fits 48 bits. Without one that was saved the
-        // first is believed wherever it is.
+        // Outside ± the largest move in each tick since the last sample, which fits 48 bits. Without one that was saved
+        // the first is believed wherever it is.
         let was_seen = (seen as i32).wrapping_neg();
-        let most = (self.largest_move as u32 as u64).wrapping_mul((input.missed_ticks as u64).wrapping_add(1));
+        let gap = ((now.marks & GAP) >> GAP_SHIFT).wrapping_add(input.missed_ticks as u32).wrapping_add(1);
+        let most = (self.largest_move as u32 as u64).wrapping_mul(gap as u64);
         let far = (most.wrapping_sub(way.unsigned_abs()) >> 32) as i32 & was_seen;
         // The way of a tick that came late is that of several.
         let on_time = all((input.missed_ticks as i32).wrapping_sub(1));
@@ -498,8 +500,9 @@ impl JointSettings {
         let missed = input.missed_ticks;
         let unseen = (now.unseen() as u16).saturating_add(1).saturating_add(missed).saturating_add(missed);
         let unseen = (unseen as u32) << UNSEEN_SHIFT & !settled;
-        let rest = now.marks & !(SEEN | IN_A_ROW | UNSEEN);
-        now.marks = (rest ^ flank) | seen_now | row | unseen;
+        let gap = gap.min(GAP >> GAP_SHIFT) << GAP_SHIFT & !present as u32;
+        let rest = now.marks & !(SEEN | IN_A_ROW | UNSEEN | GAP);
+        now.marks = (rest ^ flank) | seen_now | row | unseen | gap;
         let half_way = (step >> 1).wrapping_add(samples.step >> 1);
         samples.step = step ^ (step ^ half_way) & back;
         samples.bend = bend & !back;
@@ -758,6 +761,33 @@ mod tests {
         }
         assert_eq!(run.state.play(), &play);
         assert!(!run.tick(&run.input(4e-3)).flags.contains(Flags::SAMPLE_LOST));
+    }
+
+    /// At nearly full speed, after lost samples, the first late by two ticks or not: the next is believed if the
+    /// generator can be there, and else a glitch.
+    #[test]
+    fn the_sample_after_lost_ones_is_judged_by_all_ticks_since_the_last() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        let fastest = LIMITS.generator_rate_rad_s * LIMITS.tick_s;
+        for (lost, missed) in (1..13).flat_map(|lost| [(lost, 0), (lost, 2)]) {
+            for (part, glitch) in [(0.95, false), (1.05, true)] {
+                let (mut state, input) = (run.state, run.input(4e-3));
+                let mut tick = |input| run.joint.tick(&images(), &mut run.store, &mut state, &input).flags;
+                for tick_of in 0..lost {
+                    let missed_ticks = if tick_of == 0 { missed } else { 0 };
+                    assert!(tick(Input { generator: None, missed_ticks, ..input }).contains(Flags::SAMPLE_LOST));
+                }
+                let way = num::counts(f64::from(part * fastest) * f64::from(lost + missed + 1)) as i64;
+                let there = run.generator.offset_counts(way);
+                assert_eq!(tick(Input { generator: Some(there), ..input }).contains(Flags::GLITCH), glitch, "{lost}");
+                // One tick further: what was lost counts once.
+                let last = if glitch { run.generator } else { there };
+                let beyond = last.offset_rad(1.05 * fastest);
+                assert!(tick(Input { generator: Some(beyond), ..input }).contains(Flags::GLITCH), "{lost}");
+                assert!(state.play().is_known());
+            }
+        }
     }
 
     /// No number and no flag says "perfect" where nothing is seen, or where nothing is corrected.

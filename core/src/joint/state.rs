@@ -89,6 +89,10 @@ pub(super) const BEND_TO_SIGN: u32 = 31 - 9;
 pub(super) const FLANK_BEFORE: u32 = FLANK << FLANK_SHIFT;
 /// To those bits, by definition.
 pub(super) const FLANK_SHIFT: u32 = 6;
+/// Ticks in a row without a sample, those missed among them; up to all ones.
+pub(super) const GAP: u32 = 15 << GAP_SHIFT;
+/// To those bits, by definition.
+pub(super) const GAP_SHIFT: u32 = 12;
 /// In the upper half, by definition: ticks since three samples in a row were believed.
 pub(super) const UNSEEN: u32 = u32::MAX << UNSEEN_SHIFT;
 /// To that half, by definition.
