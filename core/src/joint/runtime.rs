@@ -33,8 +33,7 @@ use super::mode::Overrun;
 use super::signals::{Flags, Input, Output};
 use super::state::{
     BEND_TO_SIGN, CopyStatus, FINE, FIRST_IN_A_ROW, FLANK, FLANK_BACKWARD, FLANK_BEFORE, FLANK_FORWARD, FLANK_SHIFT,
-    GAP, GAP_SHIFT, IN_A_ROW, JointState, Kept, LastSamples, MENDED, MODE, SAMPLED, SEEN, STEP_TO_SIGN, UNSEEN,
-    UNSEEN_SHIFT,
+    GAP, IN_A_ROW, JointState, Kept, LastSamples, MENDED, MODE, SAMPLED, SEEN, STEP_TO_SIGN, UNSEEN,
 };
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
@@ -466,7 +465,7 @@ impl JointSettings {
         // Outside ± the largest move in each tick since the last sample, which fits 48 bits. Without one that was saved
         // the first is believed wherever it is.
         let was_seen = (seen as i32).wrapping_neg();
-        let gap = ((now.marks & GAP) >> GAP_SHIFT).wrapping_add(input.missed_ticks as u32).wrapping_add(1);
+        let gap = ((now.marks & GAP) >> GAP.trailing_zeros()).wrapping_add(input.missed_ticks as u32).wrapping_add(1);
         let most = (self.largest_move as u32 as u64).wrapping_mul(gap as u64);
         let far = (most.wrapping_sub(way.unsigned_abs()) >> 32) as i32 & was_seen;
         // The way of a tick that came late is that of several.
@@ -499,17 +498,15 @@ impl JointSettings {
         let settled = all((row as i32) << BEND_TO_SIGN) as u32;
         let missed = input.missed_ticks;
         let unseen = (now.unseen() as u16).saturating_add(1).saturating_add(missed).saturating_add(missed);
-        let unseen = (unseen as u32) << UNSEEN_SHIFT & !settled;
-        let gap = gap.min(GAP >> GAP_SHIFT) << GAP_SHIFT & !present as u32;
-        let rest = now.marks & !(SEEN | IN_A_ROW | UNSEEN | GAP);
-        now.marks = (rest ^ flank) | seen_now | row | unseen | gap;
+        let unseen = (unseen as u32) << UNSEEN.trailing_zeros() & !settled;
+        let gap = gap.min(GAP >> GAP.trailing_zeros()) << GAP.trailing_zeros() & !present as u32;
+        now.marks = (now.marks & !(SEEN | IN_A_ROW | UNSEEN | GAP)) ^ flank | seen_now | row | unseen | gap;
         let half_way = (step >> 1).wrapping_add(samples.step >> 1);
         samples.step = step ^ (step ^ half_way) & back;
         samples.bend = bend & !back;
         // After too long without an answer of the table nobody followed the play.
         let late = debounce_ticks.wrapping_sub(now.uncorrected as u32) >> 31;
-        let sampled = seen >> SAMPLED.trailing_zeros();
-        if believed as u32 | sampled & late != 0 {
+        if believed as u32 | seen >> SAMPLED.trailing_zeros() & late != 0 {
             // The play is not where it was thought.
             now.play = PlayState::unknown();
             now.marks &= !IN_A_ROW;

@@ -90,13 +90,9 @@ pub(super) const FLANK_BEFORE: u32 = FLANK << FLANK_SHIFT;
 /// To those bits, by definition.
 pub(super) const FLANK_SHIFT: u32 = 6;
 /// Ticks in a row without a sample, those missed among them; up to all ones.
-pub(super) const GAP: u32 = 15 << GAP_SHIFT;
-/// To those bits, by definition.
-pub(super) const GAP_SHIFT: u32 = 12;
+pub(super) const GAP: u32 = 15 << 12;
 /// In the upper half, by definition: ticks since three samples in a row were believed.
-pub(super) const UNSEEN: u32 = u32::MAX << UNSEEN_SHIFT;
-/// To that half, by definition.
-pub(super) const UNSEEN_SHIFT: u32 = 16;
+pub(super) const UNSEEN: u32 = u32::MAX << 16;
 
 impl Kept {
     /// After a reset: no correction, the side of the play unknown, off.
@@ -163,7 +159,7 @@ impl Kept {
     /// Ticks since three samples in a row were believed, up to 65 535.
     #[inline(always)]
     pub(super) const fn unseen(&self) -> u32 {
-        self.marks >> UNSEEN_SHIFT
+        self.marks >> UNSEEN.trailing_zeros()
     }
 }
 
