@@ -139,7 +139,7 @@ pub fn wind_up_parts(
         ("teeth and rim", teeth),
         ("cup or sleeve", cup - teeth),
         ("balls", balls - cup),
-        ("empirical (contact_compliance)", empirical),
+        ("empirical part", empirical),
     ];
     let of = |(part, rad): (&'static str, f64)| WindUpPart {
         part,

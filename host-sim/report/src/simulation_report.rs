@@ -195,12 +195,7 @@ impl RunKnown<'_> {
             [over_pitch(), ChartAxis::new("Output error less mean", PageQuantity::Error)],
             self.chart(Lines::of(vec![series])),
         );
-        let mut blocks = vec![
-            PageBlock::Figure(drive_figure(&format!("under {load} N·m, turning {way}"))),
-            ripple,
-            stress_figure(self.chart(stress_lines(motion))),
-            sharing_figure(self.chart(sharing_lines(motion))),
-        ];
+        let mut blocks = vec![PageBlock::Figure(drive_figure(&format!("under {load} N·m, turning {way}"))), ripple];
         blocks.extend(motion.sleeve.as_ref().map(|_| PageBlock::Figure(sleeve_figure())));
         Some(PageSection::new("motion", "The drive at work", blocks))
     }
@@ -258,6 +253,10 @@ impl RunKnown<'_> {
     /// How the teeth share the load along the path, stress, pressures, contacts, the torque of the generator.
     fn load(&self) -> PageSection {
         let mut blocks = Vec::new();
+        if let Some(motion) = self.motion {
+            blocks.push(stress_figure(self.chart(stress_lines(motion))));
+            blocks.push(sharing_figure(self.chart(sharing_lines(motion))));
+        }
         if self.rows.len() > 1 {
             let (axis, places) = self.along();
             let curves = |id, title, caption: &str, y, of: &[OfRow]| {
