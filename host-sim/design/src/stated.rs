@@ -283,7 +283,7 @@ fn described(figure: &'static str) -> (&'static str, &'static str, &'static [&'s
             "Ratcheting torque",
             "N·m",
             &[],
-            "largest torque with an equilibrium, looked for up to the stated one by simulate --ratcheting: at a ratio of 1 it holds",
+            "largest torque with an equilibrium, by simulate --ratcheting: looked for up to the stated one",
         ),
         "starting_torque_n_m" => (
             "Starting torque",
