@@ -201,7 +201,7 @@ fn the_page_of_a_diagnosis_agrees_with_diagnosis_json() {
         json["choices"].as_array().unwrap().iter().map(|choice| choice["id"].as_str().unwrap()).collect();
     assert!(levels.starts_with(&["nominal", "recalibrated"]), "{levels:?}");
     assert_eq!(levels.contains(&"extended"), !diagnosis["causes"].as_array().unwrap().is_empty());
-    for figure in ["over-generator", "angle-generator", "orders-generator", "drift", "over-time"] {
+    for figure in ["over-generator", "orders-generator", "over-time"] {
         assert!(json["figures"][figure]["number"].as_u64().is_some_and(|n| n > 0), "{figure}");
     }
     desk.line(&format!("{line} --no-report --out bare")).done();

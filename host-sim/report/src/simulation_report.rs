@@ -174,7 +174,7 @@ impl RunKnown<'_> {
 
     /// The figures of the summary.
     fn found(&self) -> PageSection {
-        let table = PageBlock::figures(self.caption(), &self.summary.figures());
+        let table = PageBlock::figures(format!("All figures of {}", self.caption()), &self.summary.figures());
         PageSection::folded("found", "All figures", vec![table])
     }
 

@@ -36,7 +36,7 @@ pub fn page(r: &Reproduction, animations: Vec<Result<Animation, AnimationError>>
             .into(),
         choice_is: "Generator",
         headlines: vec![headline(r)],
-        sections: vec![claims(r), errors(r, &animations)],
+        sections: vec![errors(r, &animations), claims(r)],
         animations,
         provenance: provenance.map(|(name, value)| (name.to_owned(), value)).into(),
         results: Map::from_iter([("reproduce".to_owned(), json!(r))]),
@@ -113,7 +113,7 @@ fn claims(r: &Reproduction) -> PageSection {
              is no evidence, the difference of the generators is.",
         ),
     ];
-    PageSection::new("claims", "Claim by claim", blocks)
+    PageSection::folded("claims", "Claim by claim", blocks)
 }
 
 /// Error of the unloaded runs over the generator angle, degrees and arcsec, each in a colour.
