@@ -123,14 +123,9 @@ impl<'p> Motion<'p> {
         }
     }
 
-    /// Angle of the output under its load, rad: that of the circular spline, and the wind-up that is not of the FEM.
-    pub fn output_rad(&self) -> f64 {
-        self.state.output_rad + self.problem.drive.contact_wind_up_rad(self.state.torque_n_m)
-    }
-
     /// Output angle minus generator angle over the ratio, rad; positive when the output leads.
     pub fn error_rad(&self) -> f64 {
-        self.output_rad() - self.state.generator_rad / self.problem.drive.ratio()
+        self.problem.error_rad(&self.state)
     }
 
     /// Error of the output in arc-seconds, positive when the output leads.

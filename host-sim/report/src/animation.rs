@@ -330,9 +330,7 @@ impl Animation {
         let (fs, cs) = (&problem.flexspline, &problem.circular_spline);
         self.flexspline.add(fs, &whole.u, &stress(fs, &whole.u), frame);
         self.circular_spline.add(cs, &whole.v, &stress(cs, &whole.v), frame);
-        let output_rad = state.output_rad + problem.drive.contact_wind_up_rad(state.torque_n_m);
-        let error = output_rad - state.generator_rad / self.ratio;
-        self.error_arcsec[frame.rem_euclid(FRAMES as i64) as usize] = error.to_degrees() * 3600.0;
+        self.error_arcsec[frame.rem_euclid(FRAMES as i64) as usize] = problem.error_rad(state).to_degrees() * 3600.0;
         let sampled = self.flexspline.sampled();
         for found in flank_forces(problem, state, |tooth| sampled.contains(&tooth)) {
             let row = if found.side == Side::Plus { 0 } else { 4 };

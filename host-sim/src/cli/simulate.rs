@@ -342,9 +342,7 @@ fn phase(phase: Phase) -> &'static str {
 /// An increment in one line.
 fn line(now: &Observation) -> String {
     let state = now.state;
-    let drive = &now.problem.drive;
-    let output_rad = state.output_rad + drive.contact_wind_up_rad(state.torque_n_m);
-    let error = (output_rad - state.generator_rad / drive.ratio()).to_degrees() * 3600.0;
+    let error = now.problem.error_rad(state).to_degrees() * 3600.0;
     format!(
         "{:<20} {:>5}/{}  generator {:+.6} rad  load {:+.3} N.m  error {error:+.4}\"  {} iterations",
         phase(now.phase),

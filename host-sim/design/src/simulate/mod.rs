@@ -574,7 +574,7 @@ impl<'a> RunState<'a> {
         let row = Row {
             step,
             generator_rad: state.generator_rad,
-            output_rad: motion.output_rad(),
+            output_rad: motion.problem().output_rad(state),
             error_arcsec: motion.error_arcsec(),
             torque_n_m: state.torque_n_m,
             flank_contacts: increment.flank_contacts,

@@ -247,7 +247,7 @@ impl<'a> Sampler<'a> {
 
     fn computed(&self, motion: &Motion<'_>) -> Computed {
         let State { generator_rad, torque_n_m, .. } = *motion.state();
-        let output_rad = motion.output_rad();
+        let output_rad = self.problem.output_rad(motion.state());
         let (temperature_c, direction) = (self.temperature_c, Direction::Forward);
         let sample = Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad };
         Computed { sample, compliance: motion.last().compliance_rad_per_n_m }

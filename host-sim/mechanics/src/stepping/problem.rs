@@ -174,6 +174,16 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// Angle of the output under its load, rad: that of the circular spline, and the wind-up that is not of the FEM.
+    pub fn output_rad(&self, state: &State) -> f64 {
+        state.output_rad + self.drive.contact_wind_up_rad(state.torque_n_m)
+    }
+
+    /// Output angle minus generator angle over the ratio, rad; positive when the output leads.
+    pub fn error_rad(&self, state: &State) -> f64 {
+        self.output_rad(state) - state.generator_rad / self.drive.ratio()
+    }
+
     /// Sets up the drive with generator `kind` at a temperature.
     pub fn new(
         drive: &Drive,
