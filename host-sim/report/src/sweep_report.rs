@@ -135,17 +135,15 @@ fn drawn(of: &SweepSources<'_>, one: &OfGenerator) -> Headline {
 /// Of variants: which is best in the first target, and which in the second.
 fn best(of: &SweepSources<'_>) -> Headline {
     let SweepSources { plan, sweep, judge, .. } = of;
-    let (meet, all) = (sweep.meet, sweep.rows.len());
-    let front = || sweep.rows.iter().filter(|row| row.is_front);
-    let best = judge.targets.iter().filter_map(|(name, sense)| {
+    let front = judge.front(plan, &sweep.rows);
+    let mut best = judge.targets.iter().take(2).filter_map(|(name, sense)| {
         let figure = plan.figure(name)?;
-        let cost = |row: &&VariantRow| sense.cost(row.figures[figure]);
-        let row = front().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
+        let cost = |row: &VariantRow| sense.cost(row.figures[figure]);
+        let row = *front.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
         Some((name, *sense, row, row.figures[figure]))
     });
-    let mut best = best.take(2);
     let Some((name, _, first, number)) = best.next() else {
-        let answer = format!("None of {all} variants meets the constraints.");
+        let answer = format!("None of {} variants meets the constraints.", sweep.rows.len());
         return Headline::new(answer.into(), RichText::new("–"), "variants that meet the constraints");
     };
     let sets = |row: &VariantRow| {
@@ -153,7 +151,8 @@ fn best(of: &SweepSources<'_>) -> Headline {
             plan.columns.iter().zip(&plan.variants[row.variant]).map(|(path, value)| format!("{path} = {value}"));
         [row.generator.in_words().to_owned()].into_iter().chain(sets).collect::<Vec<_>>().join(", ")
     };
-    let mut answer = RichText::new(format!("Best of {meet} variants that meet the constraints: {}", sets(first)));
+    let answer = format!("Best of {} variants that meet the constraints: {}", sweep.meet, sets(first));
+    let mut answer = RichText::new(answer);
     if let Some((other, sense, row, second)) = best.next() {
         let most = if sense == Sense::Least { "least" } else { "largest" };
         let of = if std::ptr::eq(row, first) { "the same".to_owned() } else { sets(row) };
@@ -240,11 +239,8 @@ fn front(of: &SweepSources<'_>) -> PageBlock {
     let head = ["Variant", "Generator"].into_iter();
     let header: Vec<&str> = head.chain(first.iter().copied()).chain(columns).chain(others.iter().copied()).collect();
     let caption = format!("Variants that no other beats in all of: {better}. All variants are in sweep.csv");
-    let mut rows: Vec<&VariantRow> = sweep.rows.iter().filter(|row| row.is_front).collect();
-    if let Some((figure, sense)) = judge.targets.first().and_then(|(name, sense)| Some((plan.figure(name)?, sense))) {
-        rows.sort_by(|a, b| sense.cost(a.figures[figure]).total_cmp(&sense.cost(b.figures[figure])));
-    }
-    PageBlock::table(caption, &header, rows.into_iter().take(MOST_ROWS).map(row).collect())
+    let rows = judge.front(plan, &sweep.rows).into_iter();
+    PageBlock::table(caption, &header, rows.take(MOST_ROWS).map(row).collect())
 }
 
 /// Rank correlations of each figure, the strongest first.

@@ -287,7 +287,7 @@ fn reduced(
     report::write(&page, folder, &mut outputs)?;
     outputs.finish()?;
     context.print(&sweep, || {
-        let ReducedSweep { drive, converged, failed, refused, meet, rows, generators, .. } = &sweep;
+        let ReducedSweep { drive, converged, failed, refused, meet, rows, .. } = &sweep;
         let runs = rows.len();
         let mut text = format!(
             "{drive}: {runs} runs; {converged} converged, {failed} failed, {refused} refused; {meet} meet the \
@@ -295,16 +295,17 @@ fn reduced(
         );
         text.extend(remarks.iter().map(|remark| format!("remark: {remark}\n")));
         for Headline { choice, answer, .. } in &page.headlines {
-            text += &format!("{}: {answer}\n", choice.as_deref().unwrap_or_default());
+            text += &format!("{}{answer}\n", choice.as_ref().map_or_else(String::new, |of| format!("{of}: ")));
         }
         let (folder, spent) = (folder.display(), context.spent().in_words());
         text += &format!("wrote sweep.csv, sweep.json and report.html to {folder}/ in {spent}");
-        let best = generators.iter().find_map(|of| Some((of.generator, *of.front.first()?)));
-        let next = best.filter(|_| partial.is_none()).map(|(kind, number)| {
-            let choices = plan.sets(number - 1).into_iter().filter(|set| !is_error_of_making(set));
-            let sets: String = choices.map(|set| format!(" --set {}", quoted(&set))).collect();
-            context.next(&format!("tables --generator {kind}{sets}"))
-        });
+        let front = judge.front(plan, &sweep.rows);
+        let next =
+            front.first().filter(|_| partial.is_none()).map(|VariantRow { generator: kind, variant, .. }| {
+                let choices = plan.sets(*variant).into_iter().filter(|set| !is_error_of_making(set));
+                let sets: String = choices.map(|set| format!(" --set {}", quoted(&set))).collect();
+                context.next(&format!("tables --generator {kind}{sets}"))
+            });
         text + &say::next(next.as_slice())
     })?;
     if sweep.converged == 0 {

@@ -148,4 +148,14 @@ impl Judge {
         let best: Vec<bool> = rows.iter().map(|row| !targets.is_empty() && is_best(row)).collect();
         rows.iter_mut().zip(best).for_each(|(row, best)| row.is_front = best);
     }
+
+    /// The Pareto front of marked rows, best in the first target first.
+    pub fn front<'r>(&self, plan: &VariantPlan, rows: impl IntoIterator<Item = &'r VariantRow>) -> Vec<&'r VariantRow> {
+        let mut front: Vec<&VariantRow> = rows.into_iter().filter(|row| row.is_front).collect();
+        if let Some((first, sense)) = self.targets_in(plan).first() {
+            let cost = |row: &VariantRow| sense.cost(row.figures[*first]);
+            front.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        }
+        front
+    }
 }

@@ -145,11 +145,6 @@ fn of_generator(
 ) -> OfGenerator {
     let sound = rows.iter().filter(|row| row.generator == generator && row.status == RunStatus::Converged);
     let sound: Vec<&VariantRow> = sound.collect();
-    let mut front: Vec<&VariantRow> = sound.iter().copied().filter(|row| row.is_front).collect();
-    if let Some((first, sense)) = judge.targets_in(plan).first() {
-        let cost = |row: &VariantRow| sense.cost(row.figures[*first]);
-        front.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
-    }
     let column = |k: usize| sound.iter().map(move |row| row.figures[k]);
     let (mut figures, mut ranks) = (Vec::new(), Vec::new());
     for (k, figure) in plan.figures().into_iter().enumerate() {
@@ -172,7 +167,7 @@ fn of_generator(
         |name: &str, limit: f64| plan.figure(name).map_or(0, |k| column(k).filter(|value| *value > limit).count());
     OfGenerator {
         generator,
-        front: front.iter().map(|row| row.variant + 1).collect(),
+        front: judge.front(plan, sound.iter().copied()).iter().map(|row| row.variant + 1).collect(),
         figures,
         ranks,
         beyond_kernels: above("axes_apart_um", plan.reach_um()),

@@ -490,6 +490,10 @@ fn the_front_is_of_all_generators_and_of_teeth_that_play() {
     judge.mark(&plan, &mut rows);
     assert_eq!(rows.iter().map(|row| row.meets).collect::<Vec<_>>(), [true, true, false, true]);
     assert_eq!(rows.iter().map(|row| row.is_front).collect::<Vec<_>>(), [false, true, false, false]);
+    // Its order is that of the first target, whichever generator comes first among the rows.
+    rows[0].is_front = true;
+    let front: Vec<GeneratorKind> = judge.front(&plan, &rows).iter().map(|row| row.generator).collect();
+    assert_eq!(front, [GeneratorKind::DoubleDisc, GeneratorKind::Cam]);
 }
 
 /// The variant made worse has the smaller error where it was looked at; it is compared with those made alike alone.
