@@ -16,6 +16,11 @@ use crate::linear::Solution;
 
 /// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are exchanged.
 const MOST_ROUNDS: usize = 10;
+/// Number of the best candidates that are refitted jointly, … *Guess*: it bounds the time.
+const CONTENDERS: usize = 3;
+/// … those whose gain is at least this share of what the best gains. *Guess*: what others have taken of a candidate is
+/// no more than that.
+const CONTENDS: f64 = 0.6;
 /// Models that are refined in each round. *Guess*: it bounds the time; the right one is among the first few.
 const REFINED: usize = 9;
 /// Best starting points that are kept each time that a model is tried. *Guess*: the second one for a wheel that has two
@@ -623,6 +628,7 @@ impl<'l> Chooser<'_, '_, 'l> {
         for (_, next) in grown.iter().filter(|(gain, _)| everything && *gain > CLOSE_GAIN) {
             self.bests.came_close(next.newest());
         }
+        contenders_settled(problem, &mut grown, before);
         // Something with a name goes before something without unless that is clearly better.
         let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
         let best_named = best_named.map(|(_, next)| next.newest().law);
@@ -747,4 +753,23 @@ impl<'l> Chooser<'_, '_, 'l> {
         }
         self.backward(selected)
     }
+}
+
+/// The best by name of selections that have grown by a term, and those close to it, settle before they are compared:
+/// what they were refined with has taken some of what is there, which is not the same share of each. Gains are over
+/// `before`.
+fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [Grown<'l>], before: f64) {
+    let mut named: Vec<&mut Grown<'l>> = grown.iter_mut().filter(|(_, next)| next.newest().law.named()).collect();
+    named.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let least = named.first().map_or(f64::INFINITY, |(best, _)| (CONTENDS * best).max(LEAST_EVIDENCE));
+    named.truncate(CONTENDERS);
+    named.retain(|(gain, next)| *gain >= least && but(&next.terms, next.terms.len() - 1).any(|t| !t.places.is_empty()));
+    if named.len() < 2 {
+        return;
+    }
+    named.into_par_iter().with_max_len(1).for_each(|grown| {
+        if let Some(settled) = settle(problem, grown.1.clone()) {
+            *grown = (settled.evidence() - before, settled);
+        }
+    });
 }
