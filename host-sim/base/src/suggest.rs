@@ -28,12 +28,17 @@ const SHORTEST_WORD: usize = 3;
 /// Letters of the longest unit that ends a name, `arcsec`.
 const LONGEST_UNIT: usize = 6;
 
+/// Letters of a name beyond which it is no name (a guess): a quote that nobody closed makes a file of one, and
+/// comparing takes the product of the letters of both.
+const LONGEST_NAME: usize = 200;
+
 /// The name of `known` that `found` is likely to mean; `None` if it is one of them, or like none.
 #[must_use]
 pub fn likeliest<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
     let meant = words(found);
     known
         .into_iter()
+        .filter(|name| found.len().max(name.len()) <= LONGEST_NAME)
         .filter_map(|name| Some((distance(&meant, &words(name))?, name)))
         .min_by_key(|(far, _)| *far)
         .and_then(|(_, name)| (name != found).then_some(name))
@@ -209,6 +214,8 @@ mod tests {
             assert_eq!(likeliest(found, KNOWN), None, "{found}");
         }
         assert_eq!(likeliest("cam", KNOWN), None);
+        let file = "generator_rad ".repeat(100_000);
+        assert_eq!((likeliest(&file, KNOWN), likeliest("generator", [file.as_str()])), (None, None));
         assert_eq!(did_you_mean("; ", "cma", KNOWN), "; did you mean `cam`?");
         assert_eq!(did_you_mean("; ", "gearbox", KNOWN), "");
     }

@@ -86,11 +86,11 @@ const LEAST_BORNE_OUT_MM: f64 = 43.0;
 
 impl Caution {
     /// That the stiffness is not that of cups that are sold, and by how much, as measured of the sizes of a catalogue
-    /// (`tests/evidence catalogue`); where a sheet stands beside the figures, their ratio says it.
-    pub fn of_stiffness(drive: &Drive, has_sheet: bool) -> Option<Caution> {
+    /// (`tests/evidence catalogue`). Where a sheet stands beside the figures, their ratio says it in its place.
+    pub fn of_stiffness(drive: &Drive) -> Option<Caution> {
         let ratio = drive.ratio() - 1.0;
         let [least, most] = BORNE_OUT_RATIOS;
-        let (value, limit, words) = if has_sheet || drive.sleeve.kind == SleeveKind::Hermetic {
+        let (value, limit, words) = if drive.sleeve.kind == SleeveKind::Hermetic {
             return None;
         } else if !drive.sleeve.is_shell() {
             if drive.generator.bearing_stiffness_n_per_mm3.is_some() {
@@ -307,10 +307,10 @@ mod tests {
             few.drive("d").unwrap().drive
         };
         let cup = |drive: &Drive| Drive { sleeve: Drive::cup_95().sleeve, ..drive.clone() };
-        let said = |drive: &Drive| Caution::of_stiffness(drive, false).map_or_else(String::new, |of| of.words);
+        let said = |drive: &Drive| Caution::of_stiffness(drive).map_or_else(String::new, |of| of.words);
         let plane = few(200, 60.0);
         assert!(said(&plane).contains("5 to 8 times stiffer than cups that are sold"));
-        assert_eq!((Caution::of_stiffness(&plane, true), said(&cup(&plane))), (None, String::new()));
+        assert_eq!(said(&cup(&plane)), "");
         for (teeth, pitch_mm, words) in [
             (60, 60.0, "i = 30 is below 50"),
             (400, 60.0, "i = 200 is above 130"),

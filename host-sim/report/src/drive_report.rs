@@ -314,7 +314,7 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
     let validated = known.iter().any(|k| k.subject.validation.is_some());
     let mut sections = vec![comparison(&known, validated), motion_section(&known)];
     if validated {
-        sections.push(validation_section(&known));
+        sections.extend(validation_sections(&known));
     }
     let sheet = |k: &DriveKnown<'_>| k.subject.info.and_then(|info| Some((k.id(), info.data_sheet.clone()?)));
     let mut sheets = sheet_section(known.iter().filter_map(sheet).collect());
@@ -377,11 +377,14 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
 /// Whether the page can be relied on, and what to know before one does.
 fn judge(known: &[DriveKnown<'_>]) -> (Status, Vec<String>) {
     let mut status = Status::Good;
-    let mut remarks = Vec::new();
+    let mut remarks: Vec<(String, Vec<&str>)> = Vec::new();
     for k in known {
         let mut remark = |worse: Status, words: String| {
             status = status.max(worse);
-            remarks.push(format!("{}: {words}.", k.subject.kind.in_words()));
+            match remarks.iter_mut().find(|(said, _)| *said == words) {
+                Some((_, of)) => of.push(k.subject.kind.in_words()),
+                None => remarks.push((words, vec![k.subject.kind.in_words()])),
+            }
         };
         if let Some(info) = k.subject.info {
             if info.torque_nodes_resolved == Some(false) {
@@ -429,7 +432,7 @@ fn judge(known: &[DriveKnown<'_>]) -> (Status, Vec<String>) {
             remark(Status::BoundMissed, words);
         }
     }
-    (status, remarks)
+    (status, remarks.into_iter().map(|(words, of)| format!("{}: {words}.", of.join(", "))).collect())
 }
 
 /// A value as its JSON file has it: single precision there has the digits it needs, as a [`Value`] all of double
@@ -545,7 +548,7 @@ fn motion_section(known: &[DriveKnown<'_>]) -> PageSection {
     PageSection::new("motion", "The drive at work", blocks)
 }
 
-fn validation_section(known: &[DriveKnown<'_>]) -> PageSection {
+fn validation_sections(known: &[DriveKnown<'_>]) -> [PageSection; 2] {
     let words = |k: &DriveKnown<'_>| {
         let v = k.subject.validation?;
         let (points, increments) = (v.points.len(), v.increments);
@@ -571,22 +574,30 @@ fn validation_section(known: &[DriveKnown<'_>]) -> PageSection {
         load_axis(known),
         |p| p.torque_n_m,
     ));
-    blocks.push(missed(
-        "miss-temperature",
-        "Table less fresh FEM, over the temperature",
-        "The same points.",
-        ChartAxis::new("Temperature", PageQuantity::Temperature),
-        |p| p.temperature_c,
-    ));
-    blocks.push(PageBlock::lines(
-        "reversal",
-        "Through the clearance at a reversal",
-        "Without load the generator turns back: the output stands until the clearance is crossed, and the error grows \
+    let more = vec![
+        missed(
+            "miss-temperature",
+            "Table less fresh FEM, over the temperature",
+            "The same points.",
+            ChartAxis::new("Temperature", PageQuantity::Temperature),
+            |p| p.temperature_c,
+        ),
+        PageBlock::lines(
+            "reversal",
+            "Through the clearance at a reversal",
+            "Without load the generator turns back: the output stands until the clearance is crossed, and the error grows \
          with the generator. The line is what the core, with its play, gives from the same generator angles.",
-        [ChartAxis::new("Generator travel", PageQuantity::Degree), ChartAxis::new("Output error", PageQuantity::Error)],
-        charts(known, |k| k.subject.validation.map(reversal)),
-    ));
-    PageSection::new("validation", "Against fresh FEM", blocks)
+            [
+                ChartAxis::new("Generator travel", PageQuantity::Degree),
+                ChartAxis::new("Output error", PageQuantity::Error),
+            ],
+            charts(known, |k| k.subject.validation.map(reversal)),
+        ),
+    ];
+    [
+        PageSection::new("validation", "Against fresh FEM", blocks),
+        PageSection::folded("validation-more", "Fresh FEM over the temperature, and at a reversal", more),
+    ]
 }
 
 fn table_section(known: &[DriveKnown<'_>]) -> PageSection {

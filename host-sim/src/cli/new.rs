@@ -246,7 +246,7 @@ impl New {
             drive_hash,
             teeth,
             data_sheet,
-            caution: Caution::of_stiffness(&drive, false).filter(|_| kind == NewKind::Drive),
+            caution: Caution::of_stiffness(&drive).filter(|_| kind == NewKind::Drive),
             under_load,
             clears_with: shift.map(|shift| format!("circular_spline.profile_shift={shift}")),
             next,

@@ -192,7 +192,7 @@ impl Simulate {
             summary.wind_up_parts = parts.unwrap_or_default();
         }
         let sheet = simulation.summary.data_sheet.as_ref();
-        simulation.summary.cautions.splice(0..0, Caution::of_stiffness(&drive, sheet.is_some()));
+        simulation.summary.cautions.retain(|caution| sheet.is_none() || caution.figure != "stiffness");
         let largest = simulation.rows.iter().map(|row| row.torque_n_m.abs()).fold(0.0, f64::max);
         simulation
             .summary

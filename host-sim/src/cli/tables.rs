@@ -19,7 +19,7 @@ use flexspline_base::output::Outputs;
 use flexspline_base::spent::Spent;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::catalogue;
-use flexspline_design::cautions::{Caution, add_stress};
+use flexspline_design::cautions::add_stress;
 use flexspline_design::simulate::{Path, PlaceStress, SimulationSettings, simulate};
 use flexspline_design::stated::{Stated, TWO_SETS_OF_K, beside};
 use flexspline_design::tables::sweep::SweepProgress;
@@ -179,9 +179,8 @@ impl Tables {
                 (failure, _) => failure,
             });
         }
-        let stiff = Caution::of_stiffness(&drive, stated.is_some() || self.from_samples.is_some());
         for MadeTable { kind, info, .. } in &mut made {
-            info.cautions.splice(0..0, stiff.clone());
+            info.cautions.retain(|caution| stated.is_none() || caution.figure != "stiffness");
             info.cautions.extend(beyond(*kind));
         }
         if let (Some(stated), None) = (&stated, &self.from_samples) {

@@ -699,7 +699,8 @@ impl<'a> RunState<'a> {
                 value.abs()
             ),
         });
-        let cautions = looked.cautions().into_iter().chain(cautions).collect();
+        let stiff = Caution::of_stiffness(self.drive);
+        let cautions = stiff.into_iter().chain(looked.cautions()).chain(cautions).collect();
         let spent = self.begun.spent();
         let summary = Summary {
             schema_version: SUMMARY_SCHEMA,

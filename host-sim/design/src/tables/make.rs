@@ -12,7 +12,7 @@ use super::project::{TableError, from_sweep};
 use super::sweep::{Sampler, SweepPlan, SweepProgress, TorqueSweepError, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
-use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
+use crate::cautions::{Caution, LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::Stiffness;
 use crate::relief::tips_that_bear;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -211,7 +211,7 @@ pub fn make(
             100.0 * empirical / whole
         ));
     }
-    made.info.cautions = LookedAt {
+    let looked = LookedAt {
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),
         max_von_mises_mpa: None,
@@ -219,8 +219,8 @@ pub fn make(
         peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
         tip_contact: tips_that_bear(drive, kind, largest_n_m).ok().flatten(),
         slope_bound: Some(f64::from(made.info.slope_bound)),
-    }
-    .cautions();
+    };
+    made.info.cautions = Caution::of_stiffness(drive).into_iter().chain(looked.cautions()).collect();
     made.info.stiffness =
         flexspline::Table::check(&made.image).ok().and_then(|table| Stiffness::of_table(drive, &table));
     Ok(made)

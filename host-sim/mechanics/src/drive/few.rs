@@ -154,7 +154,7 @@ impl FewNumbers {
         Ok(made)
     }
 
-    /// Least profile shift of the circular spline, modules, with which the rigid backlash is at least [`BACKLASH_RAD`]
+    /// Least profile shift of the circular spline, modules, with which the rigid backlash is at least `BACKLASH_RAD`
     /// and no tooth interferes under any of the four generators.
     ///
     /// # Errors
