@@ -585,8 +585,8 @@ fn validation_sections(known: &[DriveKnown<'_>]) -> [PageSection; 2] {
         PageBlock::lines(
             "reversal",
             "Through the clearance at a reversal",
-            "Without load the generator turns back: the output stands until the clearance is crossed, and the error grows \
-         with the generator. The line is what the core, with its play, gives from the same generator angles.",
+            "Without load the generator turns back: the output stands until the clearance is crossed, and the error \
+             grows with the generator. The line is what the core, with its play, gives from the same generator angles.",
             [
                 ChartAxis::new("Generator travel", PageQuantity::Degree),
                 ChartAxis::new("Output error", PageQuantity::Error),
