@@ -371,6 +371,19 @@ await check("a drive on paper: teeth while one drags, FEM when one stops, times 
   await page.locator("#drive-name").selectOption("HHD-95");
   await redrawn(was);
   await until(page, "sheet", (value) => Number(value) > 1);
+  // Each slider and the picture on one screen.
+  for (const width of [390, 1280]) {
+    await page.setViewportSize({ width, height: 800 });
+    for (const of of await page.locator("#main-fields input[type=range]").all()) {
+      await of.evaluate((e) => e.scrollIntoView({ block: "nearest" }));
+      const seen = await of.evaluate((e) => {
+        const [slider, picture] = [e, document.querySelector(".sketch")].map((of) => of.getBoundingClientRect());
+        const on = document.elementFromPoint(slider.x + slider.width / 2, slider.y + slider.height / 2);
+        return on === e && picture.top >= 0 && picture.bottom <= innerHeight;
+      });
+      assert(seen, `${width} px: ${await of.getAttribute("aria-label")} hides the picture, or the picture it`);
+    }
+  }
   const slider = page.locator(".field", { has: page.locator("#f-generator-w0_mm") }).locator("input[type=range]");
   await slider.focus();
   const before = await drawn();

@@ -136,11 +136,14 @@ async function start(view) {
           { class: "form" },
           teethLabel,
           moduleLabel,
-          button("Draw it", () =>
-            make(
-              { numbers: { teeth: Number(teeth.value), module_mm: Number(module.value), generator: "cam" } },
-              free("drive"),
-            ),
+          button(
+            "Draw it",
+            () =>
+              make(
+                { numbers: { teeth: Number(teeth.value), module_mm: Number(module.value), generator: "cam" } },
+                free("drive"),
+              ),
+            { class: "of-form" },
           ),
         ),
         el("p", {}, el("a", { href: "#drive", text: "Or begin with HHD-95, the drive of the paper" })),
@@ -156,16 +159,19 @@ async function start(view) {
           "div",
           { class: "form" },
           el("label", { for: "like" }, "Size", like),
-          button("Open it", () =>
-            make(
-              { like: like.value.trim() },
-              free(
-                like.value
-                  .trim()
-                  .toLowerCase()
-                  .replace(/[^a-z0-9-]/g, "") || "drive",
+          button(
+            "Open it",
+            () =>
+              make(
+                { like: like.value.trim() },
+                free(
+                  like.value
+                    .trim()
+                    .toLowerCase()
+                    .replace(/[^a-z0-9-]/g, "") || "drive",
+                ),
               ),
-            ),
+            { class: "of-form" },
           ),
         ),
       ),
@@ -288,6 +294,11 @@ async function begin() {
     lost = Boolean(error);
   });
   show();
+  // Enter in a field does what the button of its form does.
+  addEventListener("keydown", (event) => {
+    if (event.key === "Enter" && event.target instanceof HTMLInputElement)
+      event.target.closest(".form")?.querySelector("button.of-form")?.click();
+  });
   addEventListener("hashchange", route);
   addEventListener("popstate", route);
   await route();

@@ -37,8 +37,7 @@ export function sketch() {
     const width = stage.clientWidth;
     if (!drawing || width < 50) return;
     const ratio = Math.min(devicePixelRatio, 2);
-    const beside = width > 620;
-    const height = Math.round(beside ? 0.42 * width : 1.6 * width);
+    const height = Math.round(0.42 * width);
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     canvas.style.height = `${height}px`;
     const ctx = canvas.getContext("2d");
@@ -57,7 +56,7 @@ export function sketch() {
     const output = (psi * (teeth[1] - teeth[0])) / teeth[1];
     const pitch = (2 * Math.PI) / teeth[0];
     const tip = Math.max(...tooth.map(([x]) => x));
-    const size = beside ? height : width;
+    const size = height;
     const views = [
       {
         left: 0,
@@ -69,9 +68,7 @@ export function sketch() {
         turn: 0,
         whole: true,
       },
-      beside
-        ? { left: size, top: 0, width: width - size, height }
-        : { left: 0, top: size, width, height: height - size },
+      { left: size, top: 0, width: width - size, height },
     ];
     const close = views[1];
     Object.assign(close, {

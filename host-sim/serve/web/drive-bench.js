@@ -5,15 +5,15 @@ import { cancel, over, progressOf, run, why } from "./jobs.js";
 import { csvColumns, downloads, liveChart, liveDrive, readReport, wholeReport } from "./results.js";
 import { sketch } from "./draw.js";
 
-/** What is shown first; the rest is folded. */
-const MAIN = [
-  "generator.w0_mm",
-  "flexspline.rim_thickness_mm",
-  "flexspline.width_mm",
-  "flexspline.profile_shift",
-  "circular_spline.profile_shift",
-  "flanks.friction_coefficient",
-];
+/** What is shown first, as the field calls it; the rest is folded. */
+const MAIN = {
+  "generator.w0_mm": "Radial displacement w₀ of the wave, mm",
+  "flexspline.rim_thickness_mm": "Rim thickness, mm",
+  "flexspline.width_mm": "Face width, mm",
+  "flexspline.profile_shift": "Profile shift of the flexspline, modules",
+  "circular_spline.profile_shift": "Profile shift of the circular spline, modules",
+  "flanks.friction_coefficient": "Friction coefficient of the flanks",
+};
 /** How far a slider reaches around the value of the file, as a share of it: the ranges allowed are for every size of drive. A guess. */
 const REACH = 0.2;
 /** How far it reaches where the value is zero, in its unit. Guesses. */
@@ -91,11 +91,17 @@ export async function driveBench(view, asked, bench) {
   const figures = el("div");
   const pinnedPlace = el("div");
   const makePlace = el("div");
+  const brief = el("dl", { class: "brief" });
+  // What a slider changes stays in sight next to the sliders.
   view.append(
     el("h1", { text: "A drive" }),
-    section("fields", "Its fields", form, wrong, main, rest),
-    section("drawn", "Its teeth", drawing.element),
-    section("pitch", "A pitch of contact FEM", live, figures, chart.figure, pinnedPlace, stress.figure, commands),
+    el(
+      "div",
+      { class: "bench" },
+      section("drawn", "Its teeth and what the FEM finds", drawing.element, live, brief),
+      section("fields", "Its fields", form, wrong, main, rest),
+    ),
+    section("pitch", "A pitch of contact FEM", figures, chart.figure, pinnedPlace, stress.figure, commands),
     section("make", "Its tables", makePlace),
   );
 
@@ -114,15 +120,15 @@ export async function driveBench(view, asked, bench) {
     const id = `f-${field.path.replace(".", "-")}`;
     const value = now.sets[field.path] ?? field.value;
     const problem = el("p", { class: "wrong", id: `${id}-wrong` });
-    const small = el("small", {
-      id: `${id}-about`,
-      text: field.meaning + (field.range ? `; ${field.range[0]} to ${field.range[1]}` : ""),
-    });
-    const name = field.path
-      .split(".")
-      .join(": ")
-      .replace(/_(mm|um|rad|mrad|deg|mpa|n_m|k|c)$/, (_, unit) => `, ${UNITS[unit] ?? unit}`)
-      .replaceAll("_", " ");
+    const small = el("small", { id: `${id}-about`, text: field.meaning });
+    if (field.range) small.append(`; allowed ${field.range[0]} to ${field.range[1]}`);
+    const name =
+      MAIN[field.path] ??
+      field.path
+        .split(".")
+        .join(": ")
+        .replace(/_(mm|um|rad|mrad|deg|mpa|n_m|k|c)$/, (_, unit) => `, ${UNITS[unit] ?? unit}`)
+        .replaceAll("_", " ");
     const common = { "aria-describedby": `${id}-about ${id}-wrong` };
     const row = el("div", { class: "row" });
     if (field.kind === "word") {
@@ -164,6 +170,7 @@ export async function driveBench(view, asked, bench) {
           "aria-label": `${name}, slider`,
         });
         slider.value = value;
+        small.append(`; slider ${shortly(low)} to ${shortly(high)}`);
         slider.addEventListener("pointerdown", remember);
         slider.addEventListener("keydown", (event) => {
           const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
@@ -257,9 +264,9 @@ export async function driveBench(view, asked, bench) {
       ),
       undo,
     );
-    main.replaceChildren(...listed.filter((f) => MAIN.includes(f.path)).map(fieldOf));
+    main.replaceChildren(...listed.filter((f) => f.path in MAIN).map(fieldOf));
     const groups = Map.groupBy(
-      listed.filter((f) => !MAIN.includes(f.path)),
+      listed.filter((f) => !(f.path in MAIN)),
       (f) => f.path.split(".")[0],
     );
     rest.replaceChildren(
@@ -362,7 +369,7 @@ export async function driveBench(view, asked, bench) {
     round += 1;
     changedAt = performance.now();
     live.textContent = "";
-    figures.classList.add("waits");
+    for (const old of [figures, brief]) old.classList.add("waits");
     bench.keep("drive", entries());
     for (const id of running) cancel(id);
     running.clear();
@@ -501,7 +508,7 @@ export async function driveBench(view, asked, bench) {
   let seenStress = "";
   async function present(mine) {
     if (mine !== round) return;
-    figures.classList.remove("waits");
+    for (const fresh of [figures, brief]) fresh.classList.remove("waits");
     const shown = [...pinned, ...[...found].map(([g, of]) => ({ name: g, of }))];
     const failed = shown.filter(({ of }) => of.failed);
     figures.replaceChildren(
@@ -515,6 +522,10 @@ export async function driveBench(view, asked, bench) {
       button("Pin these to compare", pin, {
         disabled: pinned.length >= MOST_PINNED || !shown.some(({ of }) => of.summary),
       }),
+    );
+    const [one] = found.values();
+    brief.replaceChildren(
+      ...FIGURES.slice(0, 7).flatMap(([words, of]) => [el("dt", { text: words }), el("dd", {}, of(one))]),
     );
     const lines = shown.filter(({ of }) => of.rows);
     if (lines.length) {
@@ -625,7 +636,7 @@ export async function driveBench(view, asked, bench) {
           makePlace.replaceChildren(el("p", { class: "wrong line", text: error.message }), again());
         }
       },
-      { id: "make-tables" },
+      { id: "make-tables", class: "of-form" },
     );
     makePlace.replaceChildren(
       el("p", {

@@ -78,17 +78,12 @@ export async function logBench(view, asked, bench) {
   const [reading, unit, verdict, causes, calibrated] = ["reading", "unit", "verdict-place", "causes", "calibrated"].map(
     place,
   );
-  const residual = liveChart(
-    "residual",
-    "Residual over time",
-    "What each model leaves of the measured error, over time",
-    "",
-  );
+  const residual = liveChart("residual", "Residual over time", "Residual of each model over time", "");
   const over = liveChart(
     "residual-turn",
     "Residual over the generator angle",
     "The residual over the generator angle",
-    "What is left with the causes found, where there are any.",
+    "Residual with the causes found, where there are any.",
   );
   const orders = liveChart(
     "residual-orders",
@@ -524,9 +519,15 @@ backlash_arcsec = ${Number(now.backlash)}
         errorOf(c.held_out.rms_before_arcsec),
         ` rms ${late ? "as measured less a reading delay" : "as measured"}, `,
         errorOf(c.held_out.rms_after_arcsec),
-        ` with the table where nothing was fitted: ${number(gain, 3)} % less.`,
+        ` with the table, held out: ${number(gain, 3)} % less.`,
       ),
-      el("p", {}, "The table holds the error to ±", errorOf(c.half_width_arcsec), " (95 %, where it was recorded)."),
+      el(
+        "p",
+        {},
+        "Error with the table: ±",
+        errorOf(c.half_width_arcsec),
+        " (95 % interval, over all its loads and angles).",
+      ),
       table(
         "Parts of the table",
         ["Part", "Verdict", "Gain", "Size", "Why"],

@@ -71,12 +71,7 @@ export async function tableBench(view, asked, bench) {
     )
     .map((f) => f.name);
   const place = el("div", { role: "status" });
-  const chart = liveChart(
-    "left",
-    "What it leaves",
-    "The measured error, and what the table leaves of it, over the rows",
-    "",
-  );
+  const chart = liveChart("left", "Residual", "Measured error, and residual with the table, over the rows", "");
   chart.figure.hidden = true;
   const columns = el("input", { type: "text", id: "replay-columns", value: asked.get("columns") ?? "", size: 40 });
   const file = logs.length
@@ -130,7 +125,7 @@ export async function tableBench(view, asked, bench) {
   view.append(
     section(
       "replay",
-      "What it leaves of a log",
+      "Residual on a log",
       file
         ? el(
             "div",
@@ -309,7 +304,7 @@ export async function certificate(view, asked) {
   const turn = liveChart(
     "turn",
     "Where it was recorded",
-    "Measured error and what the table leaves, over turns of the output",
+    "Measured error and residual with the table, over turns of the output",
     "Rows in steady motion, as measured and with the table.",
   );
   const spectrum = liveChart(
@@ -340,13 +335,13 @@ export async function certificate(view, asked) {
       button("Print", () => print()),
     ),
     table(
-      "What was measured, and what the table leaves",
+      "Measured error, and residual with the table",
       ["", "rms"],
       [
         [late ? "As measured less a reading delay" : "As measured", errorOf(c.held_out.rms_before_arcsec)],
-        ["With the table, where nothing was fitted", errorOf(c.held_out.rms_after_arcsec)],
+        ["With the table, held out", errorOf(c.held_out.rms_after_arcsec)],
         ["Left by the core, all rows, reversals among them", errorOf(c.core.rms_after_arcsec)],
-        ["The table holds the error to, 95 %", errorOf(c.half_width_arcsec)],
+        ["Error with the table, 95 % interval", errorOf(c.half_width_arcsec)],
       ],
     ),
     table(
