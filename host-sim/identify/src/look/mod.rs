@@ -373,12 +373,11 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
         guess.because(if cells.words.count > 0 { "words" } else { "empty" }, 0.9);
         return guess;
     }
-    if said.commanded && said.role != Some(Role::Torque) {
-        guess.column.role = Role::Command;
-        guess.because("its name: what was wanted, not measured", 0.6);
-    } else if let Some(role) = said.role {
+    let role = if said.commanded && said.role != Some(Role::Torque) { Some(Role::Command) } else { said.role };
+    if let Some(role) = role {
         guess.column.role = role;
-        guess.because("its name", if said.commanded { 0.6 } else { 0.8 });
+        let (why, sure) = if said.commanded { ("its name: wanted, not measured", 0.6) } else { ("its name", 0.8) };
+        guess.because(why, sure);
     } else if said.angle {
         guess.because("its name: an angle", 0.5);
     }
@@ -529,8 +528,8 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
         notes.push(format!("the columns of torque are of other joints than {}: none is proposed", listed(&joints)));
         return;
     }
-    // A torque before a current, then what explains more.
-    let mut best: Option<(bool, f64, usize)> = None;
+    // A torque before a current, what was measured before what was wanted, then what explains more.
+    let mut best: Option<((bool, bool, f64), usize)> = None;
     for &k in &candidates {
         let guess = &mut guesses[k];
         let is_torque = guess.column.role == Role::Torque;
@@ -548,11 +547,12 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
             }
             _ => guess.because("its sign does not show here", 0.4),
         }
-        if best.is_none_or(|(torque, most, _)| (is_torque, share) >= (torque, most)) {
-            best = Some((is_torque, share, k));
+        let rank = (is_torque, !guess.said.commanded, share);
+        if best.is_none_or(|(most, _)| rank >= most) {
+            best = Some((rank, k));
         }
     }
-    let Some((.., best)) = best else {
+    let Some((_, best)) = best else {
         // A load that does not change is a load: without it the table would be one for none.
         let constant = |guess: &&mut Guess| guess.column.role == Role::Torque && guess.facts.finite > 0;
         guesses.iter_mut().find(constant).into_iter().for_each(|guess| guess.column.used = true);

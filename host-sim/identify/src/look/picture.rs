@@ -68,7 +68,7 @@ pub fn text(looked: &Looked) -> String {
             100.0 * still
         );
         if let Some([low, high]) = coverage.torque_n_m {
-            let _ = writeln!(text, "torque: {low:.3} to {high:.3} N.m, positive where it turns the output forward");
+            let _ = writeln!(text, "torque: {low:.3} to {high:.3} N·m, positive where it turns the output forward");
         }
         if let Some([low, high]) = coverage.temperature_c {
             let _ = writeln!(text, "temperature: {low:.1} to {high:.1} C");

@@ -406,7 +406,7 @@ fn right(recording: &Recording, with_torque: bool) -> Result<(), String> {
             // A straight line between values ten rows apart, held behind the last of them.
             let off = torque.iter().zip(&truth.torque_n_m).take(ROWS - 10);
             let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            if off > 0.1 { Err(format!("torque off by {off} N.m")) } else { Ok(()) }
+            if off > 0.1 { Err(format!("torque off by {off} N·m")) } else { Ok(()) }
         }
         None if !with_torque => Ok(()),
         found => Err(format!("torque {}", if found.is_some() { "read" } else { "missing" })),
@@ -687,6 +687,7 @@ fn the_columns_of_one_joint_are_proposed_together() {
         assert!(generator.starts_with(motor) && output.starts_with("encoder_loadinc"), "{}", text(&looked));
         let joint = |name: &str| name.rsplit_once('_').unwrap().1.to_owned();
         assert!(joint(&generator) == joint(&output) && joint(&output) == joint(&torque), "{}", text(&looked));
+        assert!(torque.starts_with("joint_torque_current"), "what was measured: {}", text(&looked));
         assert!((looked.ratio_found.unwrap() - 101.0).abs() < 0.5, "{}", text(&looked));
         // What is missing is said, not that nothing is known.
         let due = format!("--columns generator={generator}:count/COUNTS,output={output}:count/COUNTS");
