@@ -133,7 +133,7 @@ section! {
     /// The output side.
     OutputLoadPath = output, "what brakes the output beside its load, and winds it up beside the FEM";
     /// Coulomb drag on the circular spline, N·m, against its motion.
-    drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, against its motion, N.m";
+    drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, against its motion, N·m";
     /// `κ` of the wind-up in series that drives of catalogues have beside teeth, cup and balls
     /// ([`Drive::contact_wind_up_rad`]); 0 is none.
     contact_compliance: Real, from(0.0, 100.0),
@@ -460,15 +460,15 @@ impl Drive {
     }
 
     /// Largest load (N m) that tables and kernels are made for unless set otherwise: that of the generator in HHD-95,
-    /// with the square of the diameter and with the width, which leaves the stresses of a drive of like shape as they
-    /// are; to two digits.
+    /// with the square of the diameter, with the width and with Young's modulus, so that a drive of like shape has the
+    /// same strains; to two digits.
     pub fn rated_torque_n_m(&self, kind: GeneratorKind) -> f64 {
         let diameter = |f: &Flexspline| f.module_mm * f64::from(f.teeth);
         let (ours, like) = (&self.flexspline, Drive::hhd_95().flexspline);
-        let scale = (diameter(ours) / diameter(&like)).powi(2) * ours.width_mm / like.width_mm;
+        let soft = self.material.youngs_modulus_mpa / Drive::hhd_95().material.youngs_modulus_mpa;
+        let scale = (diameter(ours) / diameter(&like)).powi(2) * ours.width_mm / like.width_mm * soft;
         let torque = kind.rated_torque_n_m() * scale;
-        let digit = 10_f64.powf(torque.log10().floor() - 1.0);
-        (torque / digit).round() * digit
+        format!("{torque:.1e}").parse().unwrap_or(torque)
     }
 
     /// Signed ratio generator / output, `+z_c / (z_c - z_f)`: the output turns the same way as the generator.
