@@ -26,7 +26,11 @@ pub struct OutputError {
 }
 
 fn failed(path: &Path) -> impl FnOnce(io::Error) -> OutputError + '_ {
-    |source| OutputError { path: path.to_owned(), source }
+    |source| {
+        // The name of a hidden file helps nobody.
+        let denied = source.kind() == io::ErrorKind::PermissionDenied;
+        OutputError { path: path.to_owned(), source: if denied { source.kind().into() } else { source } }
+    }
 }
 
 /// Files that this process reads, as they are called: no output takes their place.
@@ -125,6 +129,10 @@ pub fn prepare_folder(folder: &Path) -> Result<(), OutputError> {
         folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
     missing.reverse();
     unfinished.folders.append(&mut missing);
+    if folder.is_file() {
+        let what = "it is a file; allowed: a folder";
+        return Err(failed(folder)(io::Error::new(io::ErrorKind::InvalidInput, what)));
+    }
     fs::create_dir_all(folder).map_err(failed(folder))?;
     NamedTempFile::new_in(folder).map(drop).map_err(failed(folder))
 }

@@ -76,7 +76,12 @@ fn bad_input(error: impl std::fmt::Display) -> Failure {
 
 /// Bad input in a file.
 fn bad_file<E: std::fmt::Display>(file: &std::path::Path) -> impl Fn(E) -> Failure + '_ {
-    move |error| Failure::BadInput(format!("{}: {error}", file.display()))
+    move |error| {
+        let said = error.to_string();
+        // In the words of a system it is a directory, or denied.
+        let why = if file.is_dir() && !said.contains("folder") { "found a folder; allowed: a file" } else { &said };
+        Failure::BadInput(format!("{}: {why}", file.display()))
+    }
 }
 
 /// The number of an option, from the least to the largest that it may be.
@@ -103,7 +108,7 @@ impl From<OutputError> for Failure {
 #[command(name = "flexspline", version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "\
 flexspline COMMAND --help says more of a command, with examples.
-Angles are radians, torques N.m, temperatures degrees C, sizes mm or um as the name says; errors are
+Angles are radians, torques N·m, temperatures degrees C, sizes mm or um as the name says; errors are
 arc-seconds at the output, positive where it leads. A positive torque turns the output forward.
 Exit codes: 0 done; 1 the run failed (no convergence, a bound missed, stopped); 2 bad input.")]
 struct Cli {

@@ -350,7 +350,7 @@ fn unit_below(quantity: Quantity, place: usize, layout: &Layout) -> Result<Optio
 fn found(layout: &Layout) -> String {
     let names = &layout.names;
     if names.iter().all(|name| name.is_empty()) {
-        return "the file has no header".to_owned();
+        return "the file is empty or has no header".to_owned();
     }
     if !layout.has_names {
         return format!(

@@ -94,7 +94,7 @@ impl FaultName {
             FaultName::TorqueSign => {
                 "turn the sign of the torque round: it is positive where it turns the output forward"
             }
-            FaultName::TorqueScale => "log the torque at the output of this drive, in N.m",
+            FaultName::TorqueScale => "log the torque at the output of this drive, in N·m",
             FaultName::TorqueZero => "set the torque sensor to zero while the output bears no load, warm as in use",
             FaultName::AveragedRows => {
                 "log what is read at one instant, or take means over less time than the output takes to its other flank"

@@ -270,6 +270,9 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(String, Vec<u8>), MeasuredError> 
     let file = path.display().to_string();
     match std::fs::read(path) {
         Ok(bytes) => Ok((file, bytes)),
+        Err(_) if path.is_dir() => {
+            Err(MeasuredError { file, line: None, what: "found a folder; allowed: a file".to_owned() })
+        }
         Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
     }
 }

@@ -14,7 +14,7 @@ pub(crate) enum Refusal {
     TooFew { rows: usize, fewest: usize, recorded: String },
     #[error("generator and {0} keep one value throughout; at least one of them must change")]
     NothingMoves(Quantity),
-    #[error("torque: found {size:e} N.m in a twentieth of the rows, allowed: at most {limit:e} N.m")]
+    #[error("torque: found {size:e} N·m in a twentieth of the rows, allowed: at most {limit:e} N·m")]
     Torque { size: f64, limit: f64 },
     #[error(
         "{seen}: that is the ratio {ratio} of the same teeth with the other wheel fixed; allowed: the wheel that is \

@@ -66,7 +66,7 @@ pub(in crate::measurement) fn check(
     let Some(period) = period(log) else {
         let all = log.fault(FaultName::ClockError, 0..log.len());
         let all = all.map(|all| Fault { time_s: None, until_s: None, ..all });
-        findings.add(all, Quantity::Time, Treatment::Masked, |_| "time stands still: it is not used".to_owned());
+        findings.add(all, Quantity::Time, Treatment::Masked, |_| "time does not advance: it is not used".to_owned());
         log.take(Quantity::Time);
         return Ok(());
     };
@@ -135,7 +135,7 @@ fn standing(log: &mut Log, findings: &mut Findings) {
         return;
     }
     findings.add(fault, Quantity::Time, Treatment::Repaired, |fault| {
-        format!("time stands in {} of {rows} rows: rows of the same time are spread evenly", fault.rows)
+        format!("time does not advance in {} of {rows} rows: rows of the same time are spread evenly", fault.rows)
     });
     // At the end of a session: as fast as on the whole.
     let whole = (time[rows - 1] - time[0]).abs() / rows as f64;

@@ -90,7 +90,7 @@ fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut F
     let say_it = may_be(size, Quantity::Torque, columns, |torque| torque <= limit);
     let say_it = say_it.ok_or(Refusal::Torque { size, limit })?;
     let what = format!(
-        "torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is in another unit, and is not used{say_it}"
+        "torque of {size:.0} N·m, where {limit:.0} N·m is the most: it is in another unit, and is not used{say_it}"
     );
     log.take(Quantity::Torque);
     mismatch(log, Some(Quantity::Torque), Treatment::Masked, what, findings);

@@ -267,7 +267,7 @@ impl Layout {
         let numbers = |k: usize| column(k).filter_map(|text| text.parse::<f64>().ok()).collect::<Vec<f64>>();
         for k in 1..width {
             let apart = |whole: &str| {
-                format!("the time stands in columns {k} and {}; allowed: one column, in pandas: {whole}", k + 1)
+                format!("the time is in columns {k} and {}; allowed: one column, in pandas: {whole}", k + 1)
             };
             if self.kinds[k - 1..=k] == [CellKind::Date, CellKind::Time] {
                 notes.push(apart("pd.to_datetime(df[DATE] + \" \" + df[TIME])") + "; the date is not read");
