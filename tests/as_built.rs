@@ -9,7 +9,7 @@
 //!
 //! HHD-95 with the cam, coarse mesh, without friction: the drive is deformed afresh at each generator angle and then
 //! loaded, so that positions far apart cost no way between them. Positions lie whole flexspline pitches (`2 pi / 188`)
-//! apart, where the ideal drive is in one state; what differs is the imperfection. Loads: 2 N.m unless said otherwise.
+//! apart, where the ideal drive is in one state; what differs is the imperfection. Loads: 2 N·m unless said otherwise.
 //! References: the kinematics of rigid teeth in two lobes that share the load (harmonic drive theory: an error `p`
 //! along the pitch of one wheel turns the output by `p / r`; an eccentricity `e` of the toothing, seen by the one flank
 //! that bears, by the rectified sine `e / (r cos a) |sin(psi 94/95 - eps + a)|`, whose Fourier amplitudes are
@@ -258,7 +258,7 @@ fn what_an_offset_of_the_flanks_misses_is_hundredths_of_an_arc_second() {
     let meshed = cam(|drive| drive.flexspline.profile_shift -= thinner);
     let [offset, mesh] = [&worn, &meshed].map(|problem| [LOAD_N_M, 100.0].map(|load| error(problem, 0.0, load)));
     println!(
-        "5 um off every flank at 2 and 100 N.m: as an offset {offset:.3?}\", in the mesh {mesh:.3?}\", wind-up \
+        "5 um off every flank at 2 and 100 N·m: as an offset {offset:.3?}\", in the mesh {mesh:.3?}\", wind-up \
          {:.4}\" apart",
         (offset[1] - offset[0]) - (mesh[1] - mesh[0])
     );
@@ -267,7 +267,7 @@ fn what_an_offset_of_the_flanks_misses_is_hundredths_of_an_arc_second() {
 
 #[test]
 fn a_damaged_tooth_is_felt_where_it_bears_and_nowhere_else() {
-    // On the wave at 2 N.m about eight teeth bear on each lobe, on the minus flank: the output is turned forward.
+    // On the wave at 2 N·m about eight teeth bear on each lobe, on the minus flank: the output is turned forward.
     let change = |wheel, tooth, flank| {
         move |drive: &mut Drive| {
             drive.as_built.damaged_teeth = vec![DamagedTooth { wheel, tooth, flank, depth_um: 12.0 }];
@@ -404,7 +404,7 @@ fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
             let softness = (more.0.output_rad - less.0.output_rad) / (2.0 * load);
             println!(
                 "{kind}, all imperfections, psi {psi}: e {:.2}\", {} flanks, torque out of balance {unbalanced:.1e} \
-                 N.m; 95 dM/dT {:.5}, 95 d(delta)/d(psi) {:.5}; compliance by difference over tangent {:.5}",
+                 N·m; 95 dM/dT {:.5}, 95 d(delta)/d(psi) {:.5}; compliance by difference over tangent {:.5}",
                 (state.output_rad - psi / 95.0) * ARCSEC_PER_RAD,
                 here.flank_contacts,
                 95.0 * torque_rate,

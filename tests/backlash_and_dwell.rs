@@ -8,7 +8,7 @@
 //!        +----/-----|--- 95 b ---|-------> path      |  forward
 //! ```
 //!
-//! Loads: net torques of 0.02 and 0.01 N.m on the flanks (the drag of 0.02 N.m added), extrapolated to none: down there
+//! Loads: net torques of 0.02 and 0.01 N·m on the flanks (the drag of 0.02 N·m added), extrapolated to none: down there
 //! the error is linear in the torque for all four generators (two-roller 3.4'/N.m, four-roller 0.49'/N.m, double disc
 //! 0.041'/N.m, cam 0.010'/N.m in the backlash). By mirror symmetry b = 2 e, on the mean of a pitch. Standard mesh.
 //! Reference: an independent program with 8-node elements, which found 0.987' for the cam; 1.04' for the double disc

@@ -73,7 +73,7 @@ fn wrong_sample_files_are_refused() {
         (format!("{header}0,0,20,1,inf\n"), "output_rad is inf"),
         (format!("{header}0,0,20,2,0\n"), "direction is 2; allowed are 1 and -1"),
         (format!("{header}0,0,20,1,1e9\n"), "output_rad is 1000000000 rad"),
-        (format!("{header}0,1e7,20,1,0\n"), "torque_n_m is 10000000 N.m"),
+        (format!("{header}0,1e7,20,1,0\n"), "torque_n_m is 10000000 N·m"),
         (rows(&[1], 8, 1e-4), "no Backward samples"),
         (rows(&[1, -1], 8, -1e-4), "half"),
         (rows(&[1, -1], 8, 0.4), "rad"),

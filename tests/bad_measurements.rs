@@ -349,7 +349,7 @@ fn every_field_of_the_nominal_model_is_checked() {
             with("30000.0", "[[0.0, 3e4], [9.0, 3e4], [5.0, 3e4]]"),
             &["wrong.toml:6", "5.0"],
         ),
-        ("stiffness in words", with("30000.0", "\"stiff\""), &["wrong.toml:6", "N.m/rad"]),
+        ("stiffness in words", with("30000.0", "\"stiff\""), &["wrong.toml:6", "N·m/rad"]),
         ("backlash negative", with("= 40.0", "= -40.0"), &["wrong.toml:7", "backlash_arcsec", "-40"]),
         ("backlash infinite", with("= 40.0", "= inf"), &["wrong.toml:7", "inf"]),
         (

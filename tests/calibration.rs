@@ -185,7 +185,7 @@ fn a_motor_zero_that_is_off_by_whole_turns_is_reported() {
     desk.line("calibrate log.csv --ratio 101 --no-report --out out").done();
     desk.write("other.csv", &log_of(101.0, 0.0, 0.0));
     let said = desk.line("replay --tables out/calibrated.fxt other.csv --out again").done().stdout;
-    assert!(said.contains("it gains nothing here"), "{said}");
+    assert!(said.contains("the table is worse than none here"), "{said}");
 }
 
 /// Value and standard deviation of the zero of each log but the first, deg, by its name.
@@ -247,7 +247,7 @@ fn logs_of_other_starts_make_one_table() {
         let three = calibrated("a.csv b.csv c.csv", "--ratio 100");
         check(&three, &[("b.csv", 0.381), ("c.csv", 0.617)]);
         assert!(three["held_out"]["rms_after_arcsec"].as_f64().unwrap() < 4.0, "{three}");
-        // The hysteresis of 10 arcsec is in no table. Measured: 1.15 to 1.25 N.m without its springs, 0.66 with them.
+        // The hysteresis of 10 arcsec is in no table. Measured: 1.15 to 1.25 N·m without its springs, 0.66 with them.
         let torque = &three["torque_from_wind_up"];
         println!("{torque}");
         let number = |key: &str| torque[key].as_f64().unwrap();
@@ -271,7 +271,7 @@ fn logs_of_other_starts_make_one_table() {
             let count = rows.len() as f64;
             let rms = (rows.iter().map(|[is, said, ..]| (said - is).powi(2)).sum::<f64>() / count).sqrt();
             let inside = rows.iter().filter(|[is, _, low, high]| (low..=high).contains(&is)).count() as f64 / count;
-            println!("{log}: {rms:.3} N.m rms, {inside:.3} inside");
+            println!("{log}: {rms:.3} N·m rms, {inside:.3} inside");
             assert!(rms < 0.02 * 40.0 && (0.93..=0.97).contains(&inside), "{log}: {rms} {inside}");
         }
         std::fs::create_dir_all(desk.path("known")).unwrap();

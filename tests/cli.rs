@@ -247,7 +247,7 @@ fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
     let (torque, error) = (column("torque_n_m"), column("error_arcsec"));
     assert!(torque.len() > 3 && torque[0] == 0.0, "{torque:?}");
     assert!(torque.windows(2).all(|pair| pair[0] < pair[1]) && error.windows(2).all(|pair| pair[0] < pair[1]));
-    let last = format!("the last equilibrium is at {:.4} N.m", torque[torque.len() - 1]);
+    let last = format!("the last equilibrium is at {:.4} N·m", torque[torque.len() - 1]);
     let wound_up = format!("wound up by {:.2} arcsec", error[error.len() - 1]);
     for words in
         [last.as_str(), &wound_up, "finer steps were tried", &format!("wrote the {} rows so far", torque.len())]

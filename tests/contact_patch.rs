@@ -8,7 +8,7 @@
 //!         | |  o  | |   Lame: u_a = p a (1+nu)/E ((1-2nu) a^2 + b^2)/(b^2 - a^2)
 //! ```
 //!
-//! Loads: HHD-95 as deformed by its generator, loaded with 20 N.m, disturbed at random by 1e-5 mm; a smooth ring on a
+//! Loads: HHD-95 as deformed by its generator, loaded with 20 N·m, disturbed at random by 1e-5 mm; a smooth ring on a
 //! generator 6e-6 larger than its bore. References: central differences of the energy and of the forces; Newton's third
 //! law; Lame's thick cylinder (Timoshenko and Goodier, Theory of Elasticity, art. 28). Physics wrong if this fails: the
 //! direction or the point of attack of a contact force, weights of the integration, a moment that is not that of the

@@ -102,7 +102,7 @@ fn compare(
     let winds = wind_up(&fast) / wind_up(&reference) - 1.0;
     println!(
         "{kind}, {what}: output {output:.4}\", wind-up {:.2}\" and {:+.4} %, peak stress {:.3} %, displacements \
-         {:.1e} mm, generator torque {torque:.1e} N.m, compliance {:.2} %",
+         {:.1e} mm, generator torque {torque:.1e} N·m, compliance {:.2} %",
         wind_up(&reference),
         100.0 * winds,
         100.0 * stress,

@@ -1,13 +1,13 @@
 //! Friction between the flanks makes a loop, costs torque against the load and gives it back when the load drives.
 //!
 //! ```text
-//!   e ^   T = 50 N.m            |M_g| ^  T/95 (1 + losses)   lifting the load (backward)
+//!   e ^   T = 50 N·m            |M_g| ^  T/95 (1 + losses)   lifting the load (backward)
 //!     |  ~~~~~~~ backward             |  ------------------  T/95, no friction
 //!     |  ~~~~~~~ forward              |  T/95 (1 - losses)   lowered by the load (forward)
 //!     +-----------> psi               +-----------> psi
 //! ```
 //!
-//! Loads: 50 N.m on the output, turning it forward; the generator turned forward, then backward; coefficient 0.1 and 0,
+//! Loads: 50 N·m on the output, turning it forward; the generator turned forward, then backward; coefficient 0.1 and 0,
 //! no drag on the output. References: without friction the state does not know where it came from; with it, the work
 //! that generator and load do in a pitch is dissipated, and cannot be negative.
 //! Physics wrong if this fails: friction that pushes instead of holding back, history that is lost or kept wrongly.
@@ -26,7 +26,7 @@ fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64)
     let mut drive = Drive::hhd_95();
     drive.flanks.friction_coefficient = friction;
     drive.output.drag_torque_n_m = 0.0;
-    // With 48 points to an edge, as rollers have by default, the two-roller finds no equilibrium beyond 48.6 N.m when
+    // With 48 points to an edge, as rollers have by default, the two-roller finds no equilibrium beyond 48.6 N·m when
     // the load comes on with friction at standstill.
     let settings = SolverSettings { bore_points: Some(16), ..on(MeshLevel::Standard) };
     let problem = problem(&drive, kind, settings);
@@ -35,7 +35,7 @@ fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64)
     let describe = |way: &str, places: &[SettledPlace]| {
         let (error, torque) = (mean_error(places), mean_generator_torque(places));
         println!(
-            "{kind}, friction {friction}, {way}: e {error:.4}\", generator {torque:.5} N.m, {:.1} iterations, at most \
+            "{kind}, friction {friction}, {way}: e {error:.4}\", generator {torque:.5} N·m, {:.1} iterations, at most \
              {}",
             mean_iterations(places),
             places.iter().map(|p| p.increment.iterations).max().unwrap()
@@ -102,7 +102,7 @@ fn lifting_the_rated_load_converges() {
     let settling = run.turn_in(pitch, 8).unwrap();
     let steady = run.turn_in(pitch, 8).unwrap();
     println!(
-        "cam, friction 0.08, -200 N.m: e {:.3}\", {:.1} iterations settling, {:.1} settled",
+        "cam, friction 0.08, -200 N·m: e {:.3}\", {:.1} iterations settling, {:.1} settled",
         mean_error(&steady),
         mean_iterations(&settling),
         mean_iterations(&steady)

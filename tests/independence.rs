@@ -6,7 +6,7 @@
 //!   e with more increments     - e  |
 //! ```
 //!
-//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", for
+//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N·m; all generators. The bound is 0.1", for
 //! the loaded two-roller, which winds up by 15', 0.3".
 //! Reference: the same drive with the next finer choice. Physics wrong if this fails: something that sets the answer is
 //! not in drive.toml.
@@ -38,7 +38,7 @@ fn errors(kind: GeneratorKind, settings: SolverSettings) -> ([f64; 2], f64) {
 fn apart(kind: GeneratorKind, standard: &([f64; 2], f64), finer: &([f64; 2], f64), what: &str) -> [f64; 2] {
     let idle = standard.0.iter().zip(&finer.0).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let loaded = (standard.1 - finer.1).abs();
-    println!("{kind}, {what}: {idle:.4}\" without load, {loaded:.4}\" at {TORQUE_N_M} N.m");
+    println!("{kind}, {what}: {idle:.4}\" without load, {loaded:.4}\" at {TORQUE_N_M} N·m");
     [idle, loaded]
 }
 
@@ -56,7 +56,7 @@ fn independent(kind: GeneratorKind) {
     ] {
         let [idle, loaded] = apart(kind, &standard, &errors(kind, other), what);
         assert!(idle <= ALLOWED_ARCSEC, "{kind}, {what}: {idle}\" without load");
-        assert!(loaded <= loaded_bound, "{kind}, {what}: {loaded}\" at {TORQUE_N_M} N.m");
+        assert!(loaded <= loaded_bound, "{kind}, {what}: {loaded}\" at {TORQUE_N_M} N·m");
     }
 }
 
@@ -77,7 +77,7 @@ fn a_coarse_mesh_shows() {
     let [coarse, standard] =
         [MeshLevel::Coarse, MeshLevel::Standard].map(|mesh| errors(GeneratorKind::FourRoller, on(mesh)).1);
     let difference = (coarse - standard).abs();
-    println!("four-roller, coarse against standard mesh: {difference:.3}\" at {TORQUE_N_M} N.m");
+    println!("four-roller, coarse against standard mesh: {difference:.3}\" at {TORQUE_N_M} N·m");
     assert!((0.1..10.0).contains(&difference), "{difference}\"");
 }
 

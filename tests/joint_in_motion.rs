@@ -83,7 +83,7 @@ fn at_a_constant_rate_the_ripple_is_a_fifth_and_that_of_wind_stays() {
         );
         let found = flight(&read("rate.toml", &text).unwrap());
         let (ripple, floor) = (found.velocity_ripple, found.velocity_ripple_floor);
-        println!("{rate} rad/s, gusts of {gust} N.m: {ripple:.1?} arcsec/s, {floor:.1} without errors of the drive");
+        println!("{rate} rad/s, gusts of {gust} N·m: {ripple:.1?} arcsec/s, {floor:.1} without errors of the drive");
         assert!(ripple.none > least * ripple.compensated, "{rate} {gust}: {ripple:?}");
         assert!(gust == 0.0 && floor < ripple.compensated || gust > 0.0 && floor > 0.9 * ripple.compensated, "{floor}");
     }
@@ -250,7 +250,7 @@ fn the_drive_of_an_own_table_flies_as_its_contact_fem_does() {
     )
     .unwrap();
     let said = refused("fly heavy.toml --tables cam.fxt");
-    assert!(said.contains("N.m with this table"), "{said}");
+    assert!(said.contains("N·m with this table"), "{said}");
     let said = refused("fly camera --tables own.toml");
     assert!(said.contains("own.toml: "), "{said}");
 }

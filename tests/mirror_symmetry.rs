@@ -7,7 +7,7 @@
 //!         -T       ---+---       +T
 //! ```
 //!
-//! Loads: T = 0 (drag of 0.02 N.m only) and T = 20 N.m, each run from psi = 0 forwards, and its mirror image backwards.
+//! Loads: T = 0 (drag of 0.02 N·m only) and T = 20 N·m, each run from psi = 0 forwards, and its mirror image backwards.
 //! Reference: zero for the sum of the two errors. Coarse mesh: the symmetry
 //! is one of the mesh at any density.
 //! Physics wrong if this fails: flanks of the two sides treated differently, a sign, a mesh that is not its mirror
@@ -30,9 +30,9 @@ fn mirrors(kind: GeneratorKind) {
         let worst =
             forwards.iter().zip(&backwards).map(|(a, b)| (a.error_arcsec + b.error_arcsec).abs()).fold(0.0, f64::max);
         let largest = forwards.iter().map(|s| s.error_arcsec.abs()).fold(0.0, f64::max);
-        println!("{kind} {torque_n_m} N.m: e(-psi, -T) + e(psi, T) up to {worst:.1e}\" (e up to {largest:.2}\")");
-        assert!(worst <= 0.01, "{kind}, {torque_n_m} N.m: mirror images differ by {worst}\"");
-        assert!(largest > 10.0, "{kind}, {torque_n_m} N.m: nothing moved ({largest}\")");
+        println!("{kind} {torque_n_m} N·m: e(-psi, -T) + e(psi, T) up to {worst:.1e}\" (e up to {largest:.2}\")");
+        assert!(worst <= 0.01, "{kind}, {torque_n_m} N·m: mirror images differ by {worst}\"");
+        assert!(largest > 10.0, "{kind}, {torque_n_m} N·m: nothing moved ({largest}\")");
     }
 }
 

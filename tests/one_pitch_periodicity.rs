@@ -8,7 +8,7 @@
 //!        0   2pi/188
 //! ```
 //!
-//! Loads: none but the drag of 0.02 N.m; 50 N.m on cam and two-roller. One pitch to settle, then two pitches compared
+//! Loads: none but the drag of 0.02 N·m; 50 N·m on cam and two-roller. One pitch to settle, then two pitches compared
 //! point by point, the second by a solver that remembers nothing of the first.
 //! Reference: zero (the state goes over into itself, one tooth further).
 //! Physics wrong if this fails: a mesh or contact that is not the same at every tooth, history that should not be
@@ -32,15 +32,15 @@ fn repeats(kind: GeneratorKind, mesh: MeshLevel, torque_n_m: f64) {
     let difference =
         errors().zip(&second).map(|(first, second)| (second.error_arcsec - first).abs()).fold(0.0, f64::max);
     println!(
-        "{kind} {mesh} {torque_n_m} N.m: e repeats to {difference:.1e}\" (ripple {:.3}\" about {:.2}\")",
+        "{kind} {mesh} {torque_n_m} N·m: e repeats to {difference:.1e}\" (ripple {:.3}\" about {:.2}\")",
         range(errors().collect::<Vec<_>>()),
         first[0].error_arcsec
     );
     // Equilibrium is found to 1e-6 of the forces; one element of 9024 that is 5 % too stiff shows with 1e-3".
-    assert!(difference <= 2e-4, "{kind}, {torque_n_m} N.m: e(psi + 2 pi/188) differs from e(psi) by {difference}\"");
+    assert!(difference <= 2e-4, "{kind}, {torque_n_m} N·m: e(psi + 2 pi/188) differs from e(psi) by {difference}\"");
     // A ripple there must be: an output that does not move repeats perfectly.
     let ripple = range(errors().collect::<Vec<_>>());
-    assert!((0.05..5.0).contains(&ripple), "{kind}, {torque_n_m} N.m: ripple {ripple}\"");
+    assert!((0.05..5.0).contains(&ripple), "{kind}, {torque_n_m} N·m: ripple {ripple}\"");
 }
 
 #[test]

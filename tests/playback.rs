@@ -3,7 +3,7 @@
 //! through time, where the program goes backward from the generator.
 //!
 //! The unit: HHD-95 with the cam by its table of contact FEM, with a pitch error, two eccentricities and wider
-//! clearance, calibrated under 12 N.m from one log and judged on another. Nothing here was tried on hardware.
+//! clearance, calibrated under 12 N·m from one log and judged on another. Nothing here was tried on hardware.
 //! Wrong if this fails: a sign, half a bin, a direction, a unit, an entry played a second early, a byte order.
 
 use std::collections::BTreeMap;
@@ -586,7 +586,8 @@ fn data_that_the_playback_makes_worse_are_refused_and_say_whether_the_table_is_t
     for data in ["turned.csv", "shifted.csv"] {
         let run = export(data, "", "worse");
         assert_eq!(run.code, 2, "{data}: {}", run.stdout);
-        for reason in ["the unit's data", "more than 70 %", "the core leaves", "do not belong to this table", "--force"]
+        for reason in
+            ["the unit's data", "more than 70 %", "in the core it is", "do not belong to this table", "--force"]
         {
             assert!(run.stderr.contains(reason), "{data}: no {reason} in {}", run.stderr);
         }

@@ -9,7 +9,7 @@
 //!                                              |_____/
 //! ```
 //!
-//! References: drag of 0.02 N.m and standard gaps give 0.99' (cam) to 1.04' (double disc) of backlash
+//! References: drag of 0.02 N·m and standard gaps give 0.99' (cam) to 1.04' (double disc) of backlash
 //! (`backlash_and_dwell`); a rim that is held at one point turns by the tangential displacement of the thin ring there,
 //! `(v + (r_bore - R) theta) / r_bore`. Physics wrong if this fails: periodicity, the clearance, the deformation of the
 //! rim along its circumference.
@@ -30,7 +30,7 @@ fn metrics<'a>(json: &'a Value, generator: &str, torque: f64, variant: &str) -> 
     let found = runs
         .iter()
         .find(|run| run["generator"] == generator && number(&run["torque_n_m"]) == torque && run["variant"] == variant);
-    &found.unwrap_or_else(|| panic!("no run of {generator} at {torque} N.m, {variant}"))["metrics"]
+    &found.unwrap_or_else(|| panic!("no run of {generator} at {torque} N·m, {variant}"))["metrics"]
 }
 
 /// The verdict as anyone can work it out from the numbers of a claim.

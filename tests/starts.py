@@ -17,7 +17,7 @@ ARCSEC = math.pi / 648000.0
 RATIO = 100.0
 ROWS = 5000
 RATED = 40.0
-# Torque at which a spring slips, N.m, and arcsec that it holds back.
+# Torque at which a spring slips, N·m, and arcsec that it holds back.
 SLIPS = [(3.0, 1.0), (8.0, 2.0), (20.0, 2.0)]
 
 

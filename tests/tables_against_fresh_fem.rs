@@ -79,7 +79,7 @@ fn tables_hold_between_their_nodes_and_across_a_reversal() {
         let torque = -190.0 + 1.9 * k as f32;
         for direction in [Direction::Forward, Direction::Backward] {
             let [a, b] = [&table, &again].map(|t| t.steady_error_rad(psi, torque, 20.0, direction).unwrap());
-            assert!((a - b).abs() < 5e-9, "at {torque} N.m: {a} and {b}");
+            assert!((a - b).abs() < 5e-9, "at {torque} N·m: {a} and {b}");
         }
     }
 
@@ -88,7 +88,7 @@ fn tables_hold_between_their_nodes_and_across_a_reversal() {
     desk.line("replay --tables made/cam.fxt run/results.csv --out replayed").done();
     let summary = json(&desk, "replayed/summary.json");
     let left = summary["max_residual_arcsec"].as_f64().unwrap();
-    println!("replay at 30 N.m: largest residual {left:.3}\"");
+    println!("replay at 30 N·m: largest residual {left:.3}\"");
     assert!(left < 0.5 && summary["mean_residual_arcsec"].as_f64().unwrap().abs() < 1.0, "{summary}");
     assert_eq!((&summary["rows_of"]["generator"], &summary["remarks"]), (&json!("cam"), &json!([])));
 

@@ -5,7 +5,7 @@
 //!   flexspline and generator warm: teeth grow into the spaces, b falls by 2 alpha tan(a) per kelvin
 //! ```
 //!
-//! Loads: 20 N.m at 20 C against f s^3 20 N.m at 70 C, the penalties scaled as a stiffness per area; no load for the
+//! Loads: 20 N·m at 20 C against f s^3 20 N·m at 70 C, the penalties scaled as a stiffness per area; no load for the
 //! backlash. References: similarity of elasticity (angles are the same when stress over E is); geometry of the flank at
 //! the pressure angle of about 24.7 degrees, -0.034 to -0.037'/K for 11.5e-6/K.
 //! Physics wrong if this fails: a length that does not expand, a generator fitted to the warm flexspline, thermal
@@ -46,7 +46,7 @@ fn similar(kind: GeneratorKind) {
     assert!((at_warm - at_cold).abs() <= 1e-3, "{kind}: {at_cold}\" cold, {at_warm}\" warm under the similar load");
     // With the same torque the warm drive is the cold one under a load greater by the fall of E.
     let more = sweep(&cold, 20.0, settings(1.0), torque_n_m / (f * s.powi(3)));
-    println!("{kind}: {more:.5}\" at 20 C with {:.4} N.m", torque_n_m / (f * s.powi(3)));
+    println!("{kind}: {more:.5}\" at 20 C with {:.4} N·m", torque_n_m / (f * s.powi(3)));
     assert!((same_torque - more).abs() <= 0.005, "{kind}: {same_torque}\" warm, {more}\" with more load");
     assert!(same_torque > at_cold + 0.05);
 }

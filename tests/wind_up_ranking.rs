@@ -1,7 +1,7 @@
 //! Wind-up under load ranks the generators, and the torques and the work balance.
 //!
 //! ```text
-//!   T = 50 N.m on the output          e ^        two-roller            M_g = -T/95 on the mean of a pitch:
+//!   T = 50 N·m on the output          e ^        two-roller            M_g = -T/95 on the mean of a pitch:
 //!       ___                             |      four-roller             what the load puts in comes out
 //!      /   \  ) T                       |    double-disc               at the generator
 //!     | (o) | )                         |  cam
@@ -49,7 +49,7 @@ fn balances(kind: GeneratorKind) {
     let drag = samples[0].increment.drag_torque_n_m;
     let expected = -(TORQUE_N_M + drag) / 95.0;
     println!(
-        "{kind}: generator torque {torque:.6} N.m on the mean of a pitch, (T + drag)/95 = {:.6}, off by {:.1e}; in \
+        "{kind}: generator torque {torque:.6} N·m on the mean of a pitch, (T + drag)/95 = {:.6}, off by {:.1e}; in \
          the pitch it varies by {:.4}",
         -expected,
         torque / expected - 1.0,
@@ -68,7 +68,7 @@ fn balances(kind: GeneratorKind) {
     let by_generator = torque * pitch;
     let by_load = (TORQUE_N_M + drag) * output_turn;
     println!(
-        "{kind}: work over a pitch, generator {:.6} N.m, load {:.6} N.m, sum {:.1e} of either",
+        "{kind}: work over a pitch, generator {:.6} N·m, load {:.6} N·m, sum {:.1e} of either",
         by_generator,
         by_load,
         (by_generator + by_load) / by_load
@@ -106,7 +106,7 @@ fn cam_is_stiffest_and_two_roller_softest() {
         mean_error(&run.turn_in(run.pitch(), 3).unwrap())
     });
     for (kind, error) in order.iter().zip(errors) {
-        println!("{kind}: {error:.2}\" = {:.3}' at {TORQUE_N_M} N.m", error / 60.0);
+        println!("{kind}: {error:.2}\" = {:.3}' at {TORQUE_N_M} N·m", error / 60.0);
     }
     for k in 1..4 {
         assert!(errors[k] > 1.5 * errors[k - 1], "{} {}\", {} {}\"", order[k - 1], errors[k - 1], order[k], errors[k]);

@@ -897,7 +897,7 @@ await check("a phone shows whole captions and what a table leaves", async () => 
   const { page, close } = await open("tables/report.html", { width: 375 });
   const [caption, left] = await page.evaluate(() => {
     const box = document.querySelector("#comparison .table");
-    const column = [...box.querySelectorAll("thead th")].find((th) => th.textContent.startsWith("Left with table"));
+    const column = [...box.querySelectorAll("thead th")].find((th) => th.textContent.startsWith("Residual with table"));
     return [box.querySelector("caption span"), column].map((e) => e.getBoundingClientRect().right);
   });
   await close();

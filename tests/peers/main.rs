@@ -175,7 +175,7 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
 fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims) -> Result<(String, Peer), String> {
     let folder = options.out.join(case.name());
     let unknowns = case.problem(Method::Reference)?.degrees_of_freedom();
-    println!("== {} at {} N.m, {unknowns} dof", case.name(), case.torque_n_m);
+    println!("== {} at {} N·m, {unknowns} dof", case.name(), case.torque_n_m);
     let deck = case.export(flexspline, &folder)?;
     let peer = case.calculix(&options.ccx, &deck, Limits { cpu_s: 3600.0, memory_mb: 6000.0 })?;
     let rotation = &peer.cpu_s[1..=case.increments];

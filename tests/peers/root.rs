@@ -73,7 +73,7 @@ fn summary(
     claims: &mut Claims,
 ) -> String {
     let [low, high] = ours.interval_mpa;
-    println!("== root fillet, {kind} at {torque_n_m} N.m; CalculiX {cpu_s:.1} s");
+    println!("== root fillet, {kind} at {torque_n_m} N·m; CalculiX {cpu_s:.1} s");
     println!(
         "  ours {:.1} MPa ({low:.1} to {high:.1}), by mesh {:.1?}; CalculiX {theirs:.1} MPa",
         ours.von_mises_mpa, ours.by_mesh_mpa

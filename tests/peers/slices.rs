@@ -628,7 +628,7 @@ fn found(ccx: &Path, out: &Path, case: Case) -> Result<Found, String> {
             let theirs = deck.along(&tables, step, pair)?;
             let parts = [in_parts(&theirs), in_parts(&over_mean)];
             println!(
-                "  {} N.m, tooth {}: {:.2} and {load:.2} N/mm, over the mean along the face {:.2?} and {:.2?}",
+                "  {} N·m, tooth {}: {:.2} and {load:.2} N/mm, over the mean along the face {:.2?} and {:.2?}",
                 LOADS_N_M[step],
                 pair.tooth,
                 mean(&theirs),

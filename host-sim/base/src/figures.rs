@@ -9,7 +9,7 @@ pub struct NamedFigure {
     pub name: String,
     /// Its value, in `unit`.
     pub value: f64,
-    /// Its unit, as a terminal prints it: `arcsec`, `N.m`; empty for a number alone.
+    /// Its unit, as a terminal prints it: `arcsec`, `N·m`; empty for a number alone.
     pub unit: &'static str,
     /// Decimals on a terminal.
     pub decimals: usize,

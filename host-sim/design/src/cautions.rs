@@ -66,14 +66,14 @@ impl Caution {
         let skips = ratcheting_n_m.filter(|least| load > *least);
         let above = skips.map_or_else(String::new, |least| {
             format!(
-                ", above the ratcheting torque of the data sheet ({least} N.m): the teeth of such a drive have skipped"
+                ", above the ratcheting torque of the data sheet ({least} N·m): the teeth of such a drive have skipped"
             )
         });
         (skips.is_some() || value > MOST_OF_RATED).then(|| Caution {
             figure: "load",
             value,
             limit: skips.map_or(MOST_OF_RATED, |least| least / rated_n_m),
-            words: format!("the load of {load} N.m is {value:.1} times the rated torque of {rated_n_m} N.m{above}"),
+            words: format!("the load of {load} N·m is {value:.1} times the rated torque of {rated_n_m} N·m{above}"),
         })
     }
 }
@@ -282,7 +282,7 @@ mod tests {
         assert_eq!((load(-400.0, None), load(82.0, Some(880.0))), (None, None));
         assert!(load(-820.0, Some(880.0)).is_some_and(|(times, words)| times == 10.0 && !words.contains("ratchet")));
         let (_, words) = load(8200.0, Some(880.0)).unwrap();
-        assert!(words.contains("100.0 times the rated torque of 82 N.m, above the ratcheting torque"), "{words}");
+        assert!(words.contains("100.0 times the rated torque of 82 N·m, above the ratcheting torque"), "{words}");
         // What yields a little has a table yet; what binds, or what no steel bears, has none.
         let none = |looked: LookedAt| looked.cautions().iter().any(Caution::rules_out_tables);
         assert!(none(LookedAt { rigid_gap_um: Some(-0.11), ..sound }));

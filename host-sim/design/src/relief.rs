@@ -61,7 +61,7 @@ pub fn relieve_tips(
     let mut before: Option<(f64, f64)> = None;
     for step in 0..=MOST_STEPS {
         let tip_radius_mm = drive.flexspline.tip_radius_mm;
-        report(&format!("{torque_n_m} N.m, tips at {tip_radius_mm} mm"));
+        report(&format!("{torque_n_m} N·m, tips at {tip_radius_mm} mm"));
         left = tips_that_bear(&drive, kind, torque_n_m)?;
         let Some(tips) = left.filter(|_| may_lower && step < MOST_STEPS) else { break };
         // The share falls in proportion to what is taken off: two runs say where it ends.

@@ -426,7 +426,7 @@ impl SheetBeside {
     pub fn text(&self) -> String {
         let of = self.stated.source.as_deref().map_or_else(String::new, |source| format!(" ({source})"));
         let mut lines = format!(
-            "data sheet{of}, {} generator, {} N.m\n  {:<24}{:>12}{:>12}{:>11}\n",
+            "data sheet{of}, {} generator, {} N·m\n  {:<24}{:>12}{:>12}{:>11}\n",
             self.generator,
             self.loads_in_words(),
             "",
@@ -471,8 +471,8 @@ impl SheetBeside {
             ""
         };
         let words = format!(
-            "stiffness over that of the data sheet is {}, and its units scatter by {percent:.0} %: wind-up is not that \
-             of such a unit{way_out}",
+            "stiffness over the data sheet's is {}, and units scatter by ±{percent:.0} %: the wind-up of a real unit \
+             differs{way_out}",
             each.collect::<Vec<_>>().join(", ")
         );
         Some(Caution { figure: "data_sheet", value, limit: 1.0 + 1e-2 * percent, words })
@@ -502,7 +502,7 @@ impl SheetBeside {
             } else {
                 "the largest load, which K3 takes, is guessed"
             };
-            return Some(format!("the rated torque of {rated} N.m is not above T2, so {guessed}: {proportion}"));
+            return Some(format!("the rated torque of {rated} N·m is not above T2, so {guessed}: {proportion}"));
         }
         match self.assumed.len() {
             0 => None,
@@ -664,7 +664,7 @@ mod tests {
         };
         assert_eq!(caution(1.2, 0.8), None);
         let stiff = caution(7.7, 1.2).unwrap();
-        assert!(stiff.value == 7.7 && stiff.words.starts_with("stiffness over that of the data sheet is K1 7.70, and"));
+        assert!(stiff.value == 7.7 && stiff.words.starts_with("stiffness over the data sheet's is K1 7.70, and"));
         assert!(stiff.words.contains("30 %") && stiff.words.contains("--complete-from-data-sheet"), "{}", stiff.words);
         // Softer is further off here, and no sheet completes it.
         let soft = caution(1.5, 0.2).unwrap();
@@ -685,15 +685,15 @@ mod tests {
             SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside: Vec::new(), why: None };
         let text = shown.text();
         assert!(
-            text.contains("T2 108 largest 150 (assumed) N.m")
-                && text.contains("rated torque of 99 N.m is not above T2, so the largest load, which K3 takes, is"),
+            text.contains("T2 108 largest 150 (assumed) N·m")
+                && text.contains("rated torque of 99 N·m is not above T2, so the largest load, which K3 takes, is"),
             "{text}"
         );
         let stated = Stated { t1_n_m: None, rated_torque_n_m: Some(108.0), ..shown.stated };
         let (loads, assumed) = (stated.loads(20.0), stated.assumed());
         assert_eq!((loads.largest_n_m, &assumed[..]), (150.0, &["t1_n_m", "rated_torque_n_m"][..]));
         let said = SheetBeside { stated, loads, assumed, ..shown }.assumed_in_words().unwrap();
-        assert!(said.contains("108 N.m is not above T2, so t1_n_m, and the largest load"), "{said}");
+        assert!(said.contains("108 N·m is not above T2, so t1_n_m, and the largest load"), "{said}");
     }
 
     /// Friction of the flanks widens the loop; without it the loop is the clearance. A torque that the drive bears is

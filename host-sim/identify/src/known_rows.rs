@@ -103,7 +103,8 @@ fn check_waves(read: &Recording, columns: &ColumnMap, ratio: f64) -> Result<(), 
     let output = columns.column(Quantity::Output).0;
     let rms = |squares: f64| (squares / rows.len() as f64).sqrt() * ARCSEC_PER_RAD;
     let seen = format!(
-        "beside load and waves of the output, waves of {generator} to 2 pi leave {:.0} arcsec rms, to 360 {:.0}",
+        "with load and waves of the output, waves of {generator} to 2 pi have a residual of {:.0} arcsec rms, to \
+         360 {:.0}",
         rms(radians),
         rms(degrees)
     );

@@ -44,7 +44,7 @@ impl TurnsOff {
         let off = format!("{}{}", if *turns > 0 { "-" } else { "+" }, turns.abs());
         format!(
             "the motor's zero is off by whole turns: the generator angle reads {} turns {ahead} than that of the \
-             table{likely}; without these turns {left:.1} arcsec rms would be left. Home the motor in the turn of the \
+             table{likely}; without these turns the residual is {left:.1} arcsec rms. Home the motor in the turn of the \
              table, or take them off: --columns generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
             turns.abs(),
             -std::f64::consts::TAU * *turns as f64
@@ -185,7 +185,7 @@ mod tests {
         };
         assert!(!said(upright).contains("posture"), "{}", said(upright));
         let other = said(upright + 2.8);
-        for what in ["another posture or payload", "torque's sign is turned", "worse than none", "several reasons"] {
+        for what in ["another posture or payload", "wrong sign", "worse than none", "several reasons"] {
             assert!(other.contains(what), "{other}");
         }
     }

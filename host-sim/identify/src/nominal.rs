@@ -249,12 +249,12 @@ fixed = \"flexspline\"           # the wheel that does not turn; \"flexspline\" 
              -{LARGEST_RATIO:e} to -1
 
 [nominal]
-# Torsional stiffness, N.m/rad, {STIFFNESS}: one number, or that from each torque (N.m, the first is 0) on, as \
+# Torsional stiffness, N·m/rad, {STIFFNESS}: one number, or that from each torque (N·m, the first is 0) on, as \
              catalogues
 # give K1, K2, K3 beyond the torques 0, T1, T2.
 stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 27000.0], [30.0, 30000.0]]
 backlash_arcsec = 60.0         # whole width of the play at the output, arcsec; {BACKLASH}
-friction_torque_n_m = 1.5      # load below which the output rests inside the play, N.m; {FRICTION}; 0 if left out
+friction_torque_n_m = 1.5      # load below which the output rests inside the play, N·m; {FRICTION}; 0 if left out
 temperature_c = 20.0           # at which these numbers hold, degrees C; {TEMPERATURE}; 20 if left out
 
 [[nominal.harmonic]]  # kinematic error: amplitude sin(order generator + phase); once for each harmonic, or not at all
@@ -366,7 +366,7 @@ const SHARE: Allowed = from(0.0, 1.0);
 
 /// One stiffness, or that from each torque on: `[torque, stiffness]`.
 fn stiffness(value: &Spanned<DeValue>) -> Result<Vec<[f64; 2]>, Refused> {
-    let allowed = "a stiffness in N.m/rad or a list [[0.0, K1], [T1, K2], ...]";
+    let allowed = "a stiffness in N·m/rad or a list [[0.0, K1], [T1, K2], ...]";
     let pair = |step: &Spanned<DeValue>| match step.get_ref().as_array().map(|pair| (pair.len(), pair)) {
         Some((2, pair)) => number(pair[0].get_ref()).zip(number(pair[1].get_ref())).map(|(torque, k)| [torque, k]),
         _ => None,

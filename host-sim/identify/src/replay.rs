@@ -153,7 +153,7 @@ impl RowsOf {
 
 /// Remark on rows whose owner is not stated.
 const OF_NOBODY: &str =
-    "nothing beside the rows says of which drive and generator they are: that they are the table's was not checked";
+    "no file next to the rows names their drive and generator: whether the table is theirs was not checked";
 
 impl ReplaySummary {
     /// Puts in whose rows they are, and what has to be said of that.
@@ -172,27 +172,27 @@ impl ReplaySummary {
         let mut why = Vec::new();
         why.extend(self.other_load_rms_arcsec.map(|without| {
             format!(
-                "the load goes with the angle of the output here, and with another spring and another wave of the \
-                 output {without:.1} arcsec rms would be left: the rows may be of another posture or payload than \
-                 those of the table; calibrate on both together"
+                "the load follows the angle of the output here, and another stiffness and output wave would reduce the \
+                 residual to {without:.1} arcsec rms: the rows may be of another posture or payload than those of \
+                 the table; calibrate on both together"
             )
         }));
         why.extend(self.torque_turned_rms_arcsec.map(|turned| {
             format!(
-                "the torque's sign is turned: with the other sign {turned:.1} arcsec rms would be left; positive is \
+                "the torque has the wrong sign: with the other one the residual is {turned:.1} arcsec rms; positive is \
                  what turns the output forward: --columns torque=NAME:-N.m"
             )
         }));
         why.extend(self.generator_zero_off.as_ref().map(TurnsOff::text));
-        let is_of_unit = "is it the table of this unit, and its generator zero that of the rows?";
+        let is_of_unit = "is it the table of this unit, with the generator zero of these rows?";
         let nothing = left > measured;
         let begin = if nothing {
             format!(
-                "the table leaves {left:.1} arcsec rms where the rows have {measured:.1} without it: it gains nothing \
-                 here, and is worse than none"
+                "the residual with the table is {left:.1} arcsec rms, {measured:.1} without it: the table is worse \
+                 than none here"
             )
         } else {
-            format!("the table leaves {left:.1} arcsec rms of {measured:.1}")
+            format!("the residual with the table is {left:.1} arcsec rms, {measured:.1} without it")
         };
         match why.as_slice() {
             [] if nothing => {
@@ -208,8 +208,8 @@ impl ReplaySummary {
 /// Rows and a table that do not belong together.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "the rows are of the drive {} (BLAKE3 {}) under {}, says {} beside them; the table is of a drive with ratio \
-     {ratio} and BLAKE3 {hash} under {generator}", rows.drive, rows.drive_hash, rows.generator, RESULTS[1]
+    "the rows are of the drive {} (BLAKE3 {}) under {}, according to {} next to them; the table is of a drive with \
+     ratio {ratio} and BLAKE3 {hash} under {generator}", rows.drive, rows.drive_hash, rows.generator, RESULTS[1]
 )]
 pub struct OtherRows {
     rows: RowsOf,
@@ -266,7 +266,7 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
     recording.notes.extend(said);
     if recording.sessions.iter().all(|session| session.torque_n_m.is_none()) {
         let what =
-            "no torque: the table is read at 0 N.m, and the torque from the wind-up counts from that of the mean row";
+            "no torque: the table is read at 0 N·m, and the torque from the wind-up counts from that of the mean row";
         recording.notes.push(what.to_owned());
     }
     let rows = recording.sessions.iter().flat_map(|session| {
@@ -460,7 +460,7 @@ mod tests {
             "generator_rad,output_rad,torque_n_m\n".to_owned() + &(0..200).map(row).collect::<String>()
         };
         let refused = parse("m.csv", text(5e4, "0.126").as_bytes(), 95.0, 20.0).unwrap_err();
-        assert!(refused.line == Some(2) && refused.what.contains("10000 N.m is the most"), "{refused}");
+        assert!(refused.line == Some(2) && refused.what.contains("10000 N·m is the most"), "{refused}");
         for cell in ["", "1e400"] {
             assert_eq!(parse("m.csv", text(5.0, cell).as_bytes(), 95.0, 20.0).unwrap().len(), 199, "{cell}");
         }

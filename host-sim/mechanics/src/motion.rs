@@ -321,9 +321,9 @@ mod tests {
         let rough = problem(|drive| drive.flanks.friction_coefficient = 0.08);
         for (what, problem, torque, bound) in [
             ("no load", &smooth, 0.0, 1e-3),
-            ("50 N.m", &smooth, 50.0, 1e-3),
+            ("50 N·m", &smooth, 50.0, 1e-3),
             ("no load, friction", &rough, 0.0, 0.02),
-            ("50 N.m, friction", &rough, 50.0, 0.02),
+            ("50 N·m, friction", &rough, 50.0, 0.02),
         ] {
             for sense in [1.0, -1.0] {
                 let (at_once, later) = at_once_and_later(problem, torque, sense);

@@ -62,7 +62,7 @@ fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ide
                 let scenario = Scenario { seed: seed as u32, ..calm(load_n_m, drag_n_m, noise_n_m, torque) };
                 let core = rms(&scenario, &unit, COMPENSATED);
                 let what = format!(
-                    "load {load_n_m:.2}, drag {drag_n_m}, noise {noise_n_m} N.m, {torque:?}: {none:.2} without, \
+                    "load {load_n_m:.2}, drag {drag_n_m}, noise {noise_n_m} N·m, {torque:?}: {none:.2} without, \
                      {core:.2} core, {ideal:.2} ideal"
                 );
                 println!("{what}");

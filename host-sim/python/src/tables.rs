@@ -83,7 +83,7 @@ pub fn tables<'py>(
                 watch.tell(
                     done,
                     expected,
-                    format!("{kind} {:+.3} N.m {:+.0} °C", now.last.torque_n_m, now.last.temperature_c),
+                    format!("{kind} {:+.3} N·m {:+.0} °C", now.last.torque_n_m, now.last.temperature_c),
                 )
             })
             .map_err(failed)

@@ -189,7 +189,7 @@ def test_a_calibrator_fits_predicts_and_scores(log_file: Path) -> None:
     # A unit whose error has the opposite sign is worse off with this table than with none.
     opposite = 2.0 * frame["generator_rad"] / made.ratio - frame["output_rad"]
     assert calibrator.score(frame.assign(output_rad=opposite)) < 0.0
-    assert "arcsec rms where nothing was fitted" in repr(calibrator)
+    assert "arcsec rms held out" in repr(calibrator)
 
 
 def test_a_calibrator_is_an_estimator_of_scikit_learn(log_file: Path) -> None:

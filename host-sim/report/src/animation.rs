@@ -496,7 +496,7 @@ mod tests {
             }
             // Samples are half the teeth; the load turns the output forward and the drag holds it back.
             let found = 2e-3 * moment;
-            assert!((found / (torque - drive.output.drag_torque_n_m) - 1.0).abs() < 0.01, "{found} N.m");
+            assert!((found / (torque - drive.output.drag_torque_n_m) - 1.0).abs() < 0.01, "{found} N·m");
             assert!(inward > 0.0 && outward > inward, "{inward} N inwards, {outward} N outwards");
         }
     }

@@ -37,15 +37,15 @@ pub fn page(made: &Calibrated) -> Page {
 fn headline(c: &Calibration) -> Headline {
     let kept = c.parts.iter().filter(|part| part.kept).count();
     let words = format!(
-        "The table of this unit has {kept} part{} in addition to the prior; the core with it leaves {{}} rms of \
-         {{}} over all rows{}.",
+        "With the table of this unit the residual is {{}} rms of {{}} over all rows{}; it adds {kept} part{} to the \
+         prior model.",
         if kept == 1 { "" } else { "s" },
         if c.has_delay() { ", the delay between the readings taken out" } else { "" }
     );
     Headline::new(
         RichText::filled(&words, &[(c.core.rms_after_arcsec, 3), (c.core.rms_before_arcsec, 3)]),
         RichText::arcsec(c.core.rms_after_arcsec, 3),
-        "left by the core, rms over all rows".to_owned(),
+        "residual with the table, rms over all rows".to_owned(),
     )
 }
 
@@ -55,10 +55,10 @@ fn left(made: &Calibrated) -> PageSection {
     let measured = if c.has_delay() { "As measured less the delay" } else { "As measured" };
     let rows = vec![
         row(&format!("{measured}, rows in steady motion"), c.held_out.rms_before_arcsec),
-        row("With what was known before, where nothing was fitted", c.held_out.rms_prior_arcsec),
-        row("With the table, where nothing was fitted", c.held_out.rms_after_arcsec),
+        row("With the prior model, held out", c.held_out.rms_prior_arcsec),
+        row("With the table, held out", c.held_out.rms_after_arcsec),
         row(&format!("{measured}, all rows"), c.core.rms_before_arcsec),
-        row("Left by the core with this table, all rows", c.core.rms_after_arcsec),
+        row("Residual with this table in the core, all rows", c.core.rms_after_arcsec),
     ];
     let every = made.shown.len().div_ceil(MOST_POINTS).max(1);
     let series = |name, colour, at: usize| {
@@ -70,10 +70,10 @@ fn left(made: &Calibrated) -> PageSection {
         "Error over the output angle",
         "Rows in steady motion, before and after; here the table has seen all of them.",
         [ChartAxis::new("Output", PageQuantity::Turn), ChartAxis::new("Error", PageQuantity::Error)],
-        Lines::of(vec![series("measured", 0, 1), series("left by the table", 1, 2)]).for_every_choice(),
+        Lines::of(vec![series("measured", 0, 1), series("residual", 1, 2)]).for_every_choice(),
     );
-    let table = PageBlock::table("What is left, root mean square", &["Of", "Error"], rows);
-    PageSection::new("left", "What is left", vec![table, figure])
+    let table = PageBlock::table("Error and residual, root mean square", &["Of", "Error"], rows);
+    PageSection::new("left", "Residual", vec![table, figure])
 }
 
 fn parts(c: &Calibration) -> PageSection {
@@ -87,8 +87,8 @@ fn parts(c: &Calibration) -> PageSection {
             part.why.clone().into(),
         ]
     };
-    let caption = "Parts; the gain is the share of the squares before that a part takes where nothing was fitted, the \
-                   size half of peak to peak";
+    let caption = "Parts of the model; the gain is the share of the held-out variance that a part explains, the size \
+                   half of peak to peak";
     let header = ["Part", "Verdict", "Gain", "Size", "Why"];
     let table = PageBlock::table(caption, &header, c.parts.iter().map(row).collect());
     PageSection::new("parts", "Its parts", vec![table])
@@ -97,8 +97,7 @@ fn parts(c: &Calibration) -> PageSection {
 fn reading() -> PageSection {
     PageSection::reading(vec![PageBlock::paragraph(
         "A table of one unit says what its error is, not why: two causes that look alike in these logs are one part \
-         here. It holds for the torques, temperatures and angles recorded. The figures where nothing was fitted leave \
-         out each file or block in turn; which parts there are, how smooth they are and their coefficients \
-         are then found without it.",
+         here. It holds for the torques, temperatures and angles recorded. Held-out figures leave out each \
+         file or block in turn: parts, smoothness and coefficients are found without it.",
     )])
 }

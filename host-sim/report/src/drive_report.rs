@@ -392,7 +392,7 @@ fn judge(known: &[DriveKnown<'_>]) -> (Status, Vec<String>) {
                 remark(Status::Remark, words.to_owned());
             }
             for words in &info.remarks {
-                remark(Status::Remark, words.replace("N.m", "N·m"));
+                remark(Status::Remark, words.clone());
             }
             for caution in &info.cautions {
                 remark(Status::Caution, caution_words(caution));
@@ -486,14 +486,14 @@ fn comparison(known: &[DriveKnown<'_>], validated: bool) -> PageSection {
         // The purpose of a table comes first: a phone shows three columns.
         "Generator",
         "Largest error",
-        if validated { "Left with table, rms / largest" } else { "Left with table, rms / largest*" },
+        if validated { "Residual with table, rms / largest" } else { "Residual with table, rms / largest*" },
         "Backlash",
         "Elastic wind-up",
         "Ripple at half load",
         "Load up to, N·m",
         "table_id",
     ];
-    let caption = "What each generator does to the output, and what its table leaves";
+    let caption = "Error of the output under each generator, and the residual with its table";
     let table = PageBlock::table(caption, &header, known.iter().map(DriveKnown::compared).collect());
     let matches = "The table_id is what firmware returns for the table it carries: it matches this page with a device \
                    in the field.";

@@ -46,8 +46,8 @@ pub fn page(flown: &Flown, flight: &Flight, results: &Results, command: &str) ->
 
 fn headline(results: &Results) -> Headline {
     let rms = &results.rms_arcsec;
-    let words = "The compensated joint points to {} rms, where it leaves {} without compensation and {} with an error \
-                 map by angle and direction.";
+    let words = "The pointing error of the compensated joint is {} rms; it is {} without compensation and {} with an \
+                 error map by angle and direction.";
     let answer =
         RichText::filled(words, &[rms.compensated, rms.none, rms.fourier_by_direction].map(|arcsec| (arcsec, 3)));
     Headline::new(answer, RichText::arcsec(rms.compensated, 3), "output less target, rms")

@@ -301,7 +301,7 @@ fn on_a_page(NamedFigure { name, value, unit, .. }: &NamedFigure) -> [RichText; 
     let number = match *unit {
         "arcsec" => RichText::arcsec(*value, 4),
         "" => RichText::new(significant(*value, 3)),
-        unit => format!("{}\u{a0}{}", significant(*value, 4), unit.replace("N.m", "N·m").replace("deg", "°")).into(),
+        unit => format!("{}\u{a0}{}", significant(*value, 4), unit.replace("deg", "°")).into(),
     };
     let mut name = name.clone();
     name[..1].make_ascii_uppercase();
@@ -865,7 +865,7 @@ mod tests {
             caveat: caveat.into(),
             what: "what it is".into(),
         };
-        let figures = [figure("backlash", "arcsec", ""), figure("torque", "N.m", "a remark")];
+        let figures = [figure("backlash", "arcsec", ""), figure("torque", "N·m", "a remark")];
         let PageBlock::Table { table, .. } = PageBlock::figures("caption", &figures) else { panic!("no table") };
         assert_eq!(table.rows[0], ["Backlash".into(), RichText::arcsec(23.456, 4), "what it is".into()]);
         assert_eq!(table.rows[1], ["Torque", "23.46\u{a0}N·m", "what it is; a remark"].map(RichText::from));

@@ -84,7 +84,7 @@ struct BenchOptions {
     /// Largest generator speed for --plan, rpm [default: 60]
     #[arg(long, value_name = "RPM", requires = "plan")]
     speed_rpm: Option<f64>,
-    /// Least and largest load at the output for --plan, N.m [default: none]
+    /// Least and largest load at the output for --plan, N·m [default: none]
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, requires = "plan")]
     load_n_m: Vec<f64>,
     /// Lowest and highest temperature for --plan, degrees C [default: one, 20]
@@ -265,7 +265,7 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
         text += "each temperature is a log of its own, recorded when the drive has settled there; the encoders keep \
                  their zeros\n";
     }
-    text += "   log   output, deg           generator, turns      rpm   load, N.m     C\n";
+    text += "   log   output, deg           generator, turns      rpm   load, N·m     C\n";
     for p in &planned.passes {
         let _ = writeln!(
             text,
@@ -281,12 +281,12 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
         );
     }
     for why in &planned.cannot {
-        let _ = writeln!(text, "not told by these: {why}");
+        let _ = writeln!(text, "these logs cannot show: {why}");
     }
     let _ = writeln!(
         text,
-        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2}, {:.2} of it drift; what no part has, \
-         and an eccentric encoder at the output, come on top",
+        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2}, {:.2} of it drift; what no part \
+         models, and an eccentric output encoder, come on top",
         planned.expected_rms_arcsec,
         planned.noise.rms_arcsec,
         planned.noise.lasting_arcsec()
@@ -298,18 +298,18 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
 fn held(c: &Calibration) -> String {
     /// A guess.
     const DIFFERS: f64 = 1.25;
-    let mut text = format!("the table holds the error to ±{:.2} arcsec (95 %)", c.half_width_arcsec);
+    let mut text = format!("error with the table: ±{:.2} arcsec (95 % interval)", c.half_width_arcsec);
     if c.half_width_arcsec > DIFFERS * c.half_width_as_recorded_arcsec {
         let _ = write!(
             text,
-            " over all loads and angles between its ends, to ±{:.2} in states as they were recorded",
+            " over all its loads and angles, ±{:.2} in states as recorded",
             c.half_width_as_recorded_arcsec
         );
     }
     if c.half_width_at_another_pace_arcsec > DIFFERS * c.half_width_arcsec {
         let _ = write!(
             text,
-            " at the pace recorded, to ±{:.2} at another, as a delay between the readings would look like play here",
+            " at the speed recorded, ±{:.2} at another, as a delay between the readings would look like backlash here",
             c.half_width_at_another_pace_arcsec
         );
     }
@@ -359,7 +359,7 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         let _ = writeln!(text, "  {:<16} {kept} {gain} % of all{size}  {}", part.name, part.why);
     }
     if let Some(found) = &c.alignment {
-        let used = if found.told { "used" } else { "not told by these logs, not used" };
+        let used = if found.told { "used" } else { "these logs cannot show it, not used" };
         let _ = writeln!(
             text,
             "phase of the table: its generator angle 0 is where the logs read {:.3} ± {:.3} deg (it repeats every \
@@ -371,22 +371,22 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
     let removed = 100.0 * (1.0 - core.rms_after_arcsec / core.rms_before_arcsec);
     let _ = writeln!(
         text,
-        "the core over all rows, reversals among them, arcsec rms: {:.2} {as_measured}, {:.2} with the table {} \
-         ({removed:.1} % less)",
+        "all rows, reversals included, arcsec rms: {:.2} {as_measured}, {:.2} with table {} in the core ({removed:.1} \
+         % less)",
         core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
     );
     let _ = writeln!(
         text,
-        "rows in steady motion, each left out of the fit, arcsec rms: {:.2} {as_measured}, {:.2} with what was known, \
-         {:.2} with the parts",
+        "held-out error in steady motion, arcsec rms: {:.2} {as_measured}, {:.2} with the prior model, {:.2} with the \
+         table",
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let _ = writeln!(text, "{}", held(c));
     if let Some(torque) = &c.torque_from_wind_up {
         let _ = writeln!(
             text,
-            "torque from the wind-up, where nothing was fitted: {:.2} N.m rms off that recorded, {:+.2} in the mean, \
-             {:.0} of 100 rows inside their interval",
+            "torque from the wind-up, held out: error {:.2} N·m rms, mean {:+.2}; {:.0} of 100 rows within their 95 % \
+             interval",
             torque.rms_n_m,
             torque.bias_n_m,
             100.0 * torque.inside

@@ -225,8 +225,8 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     let _ = writeln!(text, "{}", extension.table.text());
     text += &diagnosis.text();
     if let Some(evaluation) = &extension.compensation {
-        text += "pointing error the core leaves in sessions held out, arcsec rms\n             sessions      rows   no \
-                 table    nominal calibrated   extended\n";
+        text += "pointing error with each table in the core, sessions held out, arcsec rms\n";
+        text += "             sessions      rows   no table    nominal calibrated   extended\n";
         let sessions = &evaluation.sessions;
         let mut line = |name: String, sessions: usize, rows: usize, left: &Compensation| {
             let calibrated = left.rms_calibrated_table_arcsec.map_or("–".to_owned(), |left| format!("{left:.2}"));

@@ -78,7 +78,7 @@ pub(super) struct Export {
     /// Size of each increment, rad; negative turns the generator backward [default: 0.01]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true, help_heading = "Deck")]
     step_rad: Option<f64>,
-    /// Load of an additional last step, N.m, for the wind-up between two loads [default: no such step]
+    /// Load of an additional last step, N·m, for the wind-up between two loads [default: no such step]
     #[arg(long, value_name = "T", allow_negative_numbers = true, help_heading = "Deck")]
     last_torque_n_m: Option<f64>,
 }
@@ -208,7 +208,7 @@ impl Export {
         }
         if let Some(torque) = self.last_torque_n_m.filter(|torque| !torque.is_finite()) {
             return Err(Failure::BadInput(format!(
-                "--last-torque-n-m: found {torque}; allowed: a finite number of N.m"
+                "--last-torque-n-m: found {torque}; allowed: a finite number of N·m"
             )));
         }
         Ok(())

@@ -139,7 +139,7 @@ impl PlaybackOptions {
             "tool": concat!("flexspline ", env!("CARGO_PKG_VERSION")),
             "torque_n_m": torque_n_m, "temperature_c": temperature_c,
         });
-        let mut text = format!("table {id}, {torque_n_m} N.m, {temperature_c} degrees C");
+        let mut text = format!("table {id}, {torque_n_m} N·m, {temperature_c} degrees C");
         for (name, of, residual) in
             [("model", "the table's own model", model), ("playback", "the unit's data", playback)]
         {
@@ -190,8 +190,8 @@ impl PlaybackOptions {
              or the error (--columns error=NAME:-arcsec), another ratio"
         };
         let what = format!(
-            "the unit's data: of {error:.2} arcsec rms this playback leaves {left:.2}, more than {:.0} %; the core \
-             leaves {core:.2} with the same table, {why}",
+            "the unit's data: the residual of this playback is {left:.2} arcsec rms of {error:.2}, more than {:.0} %; \
+             with the same table in the core it is {core:.2}, {why}",
             100.0 * POINTLESS
         );
         if !self.force {

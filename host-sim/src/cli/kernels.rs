@@ -87,7 +87,7 @@ fn text(made: &GeneratorReport) -> String {
     let [fs, cs] = made.second_harmonic_arcsec_per_um;
     let [at_light, at_heavy] = made.eccentricity_pp_arcsec;
     format!(
-        "{}: arcsec of error at {light} and {heavy} N.m\n  1 um second harmonic of the flexspline's pitch: {:.2}, \
+        "{}: arcsec of error at {light} and {heavy} N·m\n  1 um second harmonic of the flexspline's pitch: {:.2}, \
          {:.2}; of the circular spline's: {:.2}, {:.2}\n  circular spline {} um beside the axis: {at_light:.1}, \
          {at_heavy:.1} p-p\nwrote {}",
         made.generator, fs[0], fs[1], cs[0], cs[1], made.eccentricity_um, made.file

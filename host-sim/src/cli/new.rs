@@ -131,7 +131,7 @@ struct UnderLoad {
 impl UnderLoad {
     /// As a line.
     fn text(&self) -> String {
-        let under = format!("under {} N.m, {} generator", self.torque_n_m, self.generator);
+        let under = format!("under {} N·m, {} generator", self.torque_n_m, self.generator);
         match (&self.not_solved, &self.tip_contact) {
             (Some(why), _) => format!("not run {under}: {why}"),
             (None, Some(tips)) => format!("caution: {under}, {}", tips.in_words()),
@@ -324,7 +324,7 @@ impl New {
                     made.drive.flexspline.tip_radius_mm = relief.tip_radius_mm;
                     for (_, formula) in made.formulas.iter_mut().filter(|(path, _)| *path == TIP_RADIUS) {
                         *formula += &format!(
-                            ", lowered by {:.4} mm: so tips pass one another freely under {torque_n_m} N.m",
+                            ", lowered by {:.4} mm: so tips pass one another freely under {torque_n_m} N·m",
                             relief.lowered_mm
                         );
                     }

@@ -109,17 +109,18 @@ fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {
     let notes = summary.notes.iter().map(|note| format!("note: {note}\n"));
     let remarks = summary.remarks.iter().map(|remark| format!("remark: {remark}\n"));
     let remarks: String = faults.chain(notes).chain(remarks).collect();
+    let figures = [
+        ("error as measured, rms", summary.rms_measured_arcsec),
+        ("residual with the table, rms", summary.rms_residual_arcsec),
+        ("residual with the table, largest", summary.max_residual_arcsec),
+        ("offset of the output, removed", summary.mean_residual_arcsec),
+    ];
+    let figures: String = figures.iter().map(|(name, value)| format!("  {name:<34}{value:>12.3} arcsec\n")).collect();
     format!(
-        "table {}, {} rows, {}\n{remarks}  error as measured, rms              {:>12.3} arcsec\n  left by the table, \
-         rms             {:>12.3} arcsec\n  left by the table, largest         {:>12.3} arcsec\n  zero of the output, \
-         taken out      {:>12.3} arcsec\nwrote {} and {}",
+        "table {}, {} rows, {}\n{remarks}{figures}wrote {} and {}",
         summary.table_id,
         summary.rows,
         summary.status,
-        summary.rms_measured_arcsec,
-        summary.rms_residual_arcsec,
-        summary.max_residual_arcsec,
-        summary.mean_residual_arcsec,
         out.join("replay.csv").display(),
         out.join("summary.json").display()
     )

@@ -14,7 +14,7 @@ use flexspline_pacana_2023::{Reproduction, page, reproduce};
 /// Run the protocol of the paper with all four generators and compare with the paper's results
 ///
 /// Deform, then turn +1 rad and -2 rad in increments of 0.01 rad, without load and, for double disc and cam, under
-/// +-200 N.m, as Pacana et al. (Appl. Sci. 13, 2023) did. Each result of the paper is compared with ours and gets a
+/// +-200 N·m, as Pacana et al. (Appl. Sci. 13, 2023) did. Each result of the paper is compared with ours and gets a
 /// verdict from the numbers. The runs are repeated with other meshes, increments and penalties, and with a rim that is
 /// held at one point, which has errors of the paper's size. Writes reproduce.json and report.html.
 #[derive(Debug, Args)]

@@ -84,7 +84,7 @@ pub(super) struct ModelOptions {
     /// Wave generator: two-roller, four-roller, double-disc or cam
     #[arg(long, value_name = "G")]
     pub(super) generator: GeneratorKind,
-    /// Load torque on the output, N.m; positive turns it forward [default: 0]
+    /// Load torque on the output, N·m; positive turns it forward [default: 0]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub(super) torque_n_m: Option<f64>,
     /// Temperature, degrees C [default: the drive's reference temperature]
@@ -344,7 +344,7 @@ fn line(now: &Observation) -> String {
     let state = now.state;
     let error = now.problem.error_rad(state).to_degrees() * 3600.0;
     format!(
-        "{:<20} {:>5}/{}  generator {:+.6} rad  load {:+.3} N.m  error {error:+.4}\"  {} iterations",
+        "{:<20} {:>5}/{}  generator {:+.6} rad  load {:+.3} N·m  error {error:+.4}\"  {} iterations",
         phase(now.phase),
         now.done,
         now.total,

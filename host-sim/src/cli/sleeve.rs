@@ -87,7 +87,7 @@ fn table(drive: &Drive, result: &SleeveResult) -> String {
     let two = &result.harmonics[0];
     let _ = writeln!(
         text,
-        "at w0 = {w0} mm: {:.0} N of cos 2 theta, tilt {:.2} mrad\ntorsion {:.0} N.m/rad, lateral {:.0} N/mm\ntwo \
+        "at w0 = {w0} mm: {:.0} N of cos 2 theta, tilt {:.2} mrad\ntorsion {:.0} N·m/rad, lateral {:.0} N/mm\ntwo \
          rollers: w(45°) {:+.3}, w(90°) {:+.3} of w0",
         two.k_band_n_per_mm * w0,
         1e3 * two.tilt_rad_per_mm * w0,

@@ -104,7 +104,7 @@ struct PlanCommand {
     /// Wave generator of --vary: two-roller, four-roller, double-disc, cam, or all
     #[arg(short, long, value_name = "G", default_value = "all", conflicts_with = "tolerances")]
     generator: GeneratorNames,
-    /// Largest load of --vary, N.m [default: the rated torque of the drive's [data_sheet]; else the largest torque of a
+    /// Largest load of --vary, N·m [default: the rated torque of the drive's [data_sheet]; else the largest torque of a
     /// table of that generator: 200; four-roller 100, two-roller 20; by the size of the drive]
     #[arg(long, value_name = "T", allow_negative_numbers = true, conflicts_with = "tolerances")]
     torque_n_m: Option<f64>,

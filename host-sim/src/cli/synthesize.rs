@@ -91,7 +91,7 @@ struct ExcitationOptions {
     /// Largest speed of the generator, rad/s
     #[arg(long, value_name = "RAD/S", default_value_t = 6.0, allow_negative_numbers = true)]
     speed: f64,
-    /// Largest torque, N.m
+    /// Largest torque, N·m
     #[arg(long, value_name = "N.M", default_value_t = 40.0, allow_negative_numbers = true)]
     torque: f64,
     /// Temperatures, degrees C

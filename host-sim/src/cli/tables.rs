@@ -67,7 +67,7 @@ pub(super) struct Tables {
     /// Half-width of the play in arcsec where a sample file has one direction only
     #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
     half_width_arcsec: Option<f64>,
-    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20; by the size of the drive;
+    /// Largest torque, N·m [default: 200; four-roller 100, two-roller 20; by the size of the drive;
     /// of a cam with a [data_sheet] the rated torque]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
@@ -386,7 +386,7 @@ fn by_fem(
                     tables[k] = [tables[k][0] + 1, now.expected];
                     let [done, expected] = [0, 1].map(|of: usize| tables.iter().map(|table| table[of]).sum::<usize>());
                     let SweepProgress { torque_n_m, temperature_c, iterations } = now.last;
-                    let note = format!("{kind} {torque_n_m:+.3} N.m {temperature_c:+.0} °C, {iterations} iterations");
+                    let note = format!("{kind} {torque_n_m:+.3} N·m {temperature_c:+.0} °C, {iterations} iterations");
                     if context.verbose() {
                         bar.line(&format!("{done:>5}/{expected}  {note}"));
                     }
@@ -416,7 +416,7 @@ pub(super) fn fresh_table(
 
 fn text(report: &TablesReport<'_>, out: &std::path::Path, with_page: bool) -> String {
     let mut text = String::from(
-        "generator    table_id          bytes  torque N.m   backlash\"  wind-up\" at the ends   slope  worst \
+        "generator    table_id          bytes  torque N·m   backlash\"  wind-up\" at the ends   slope  worst \
          deviation\"\n",
     );
     for info in &report.tables {
@@ -437,7 +437,7 @@ fn text(report: &TablesReport<'_>, out: &std::path::Path, with_page: bool) -> St
     }
     let stiff: Vec<_> = report.tables.iter().filter_map(|info| Some((info, info.stiffness?))).collect();
     if !stiff.is_empty() {
-        text.push_str("stiffness    K1 to T1                K2 to T2                K3 above, N.m/rad\n");
+        text.push_str("stiffness    K1 to T1                K2 to T2                K3 above, N·m/rad\n");
     }
     for (info, k) in stiff {
         text.push_str(&format!(

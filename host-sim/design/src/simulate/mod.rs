@@ -117,7 +117,7 @@ impl SimulationSettings {
         let torques = points.iter().filter_map(|p| p.torque_n_m).chain([self.torque_n_m]);
         for torque in torques {
             if torque.is_nan() || torque.abs() > LARGEST_TORQUE_N_M {
-                let allowed = format!("-{LARGEST_TORQUE_N_M} to {LARGEST_TORQUE_N_M} N.m");
+                let allowed = format!("-{LARGEST_TORQUE_N_M} to {LARGEST_TORQUE_N_M} N·m");
                 return refuse("torque", torque.to_string(), allowed);
             }
         }
@@ -201,7 +201,7 @@ impl Unfinished {
             _ => "",
         };
         format!(
-            "; the last equilibrium is at {:.4} N.m and {:.6} rad{wind_up}{tried}",
+            "; the last equilibrium is at {:.4} N·m and {:.6} rad{wind_up}{tried}",
             last.torque_n_m, last.generator_rad
         )
     }
@@ -694,7 +694,7 @@ impl<'a> RunState<'a> {
             value,
             limit: 0.0,
             words: format!(
-                "under {torque_n_m} N.m the output stands {:.0} arcsec against its load: friction between the flanks \
+                "under {torque_n_m} N·m the output stands {:.0} arcsec against its load: friction between the flanks \
                  ({friction}) rules the sign, not the stiffness",
                 value.abs()
             ),

@@ -133,7 +133,7 @@ fn find_columns(header: &[&str]) -> Result<[Option<usize>; 3], String> {
         if let Some(known) = COLUMNS.iter().position(|known| known == name)
             && found[known].replace(position).is_some()
         {
-            return Err(format!("column {name} stands there twice"));
+            return Err(format!("column {name} is there twice"));
         }
     }
     // A column that was meant but misspelt would silently not act.
@@ -184,7 +184,7 @@ mod tests {
             ("generator_deg\n0\n", "p.csv:1: found column \"generator_deg\"; did you mean `generator_rad`?"),
             ("generator_rad,torque\n0,0\n", "p.csv:1: found column \"torque\"; did you mean `torque_n_m`?"),
             ("generator_rad,torque_nm\n0,0\n", "p.csv:1: found column \"torque_nm\"; did you mean `torque_n_m`?"),
-            ("generator_rad,generator_rad\n0,0\n", "p.csv:1: column generator_rad stands there twice"),
+            ("generator_rad,generator_rad\n0,0\n", "p.csv:1: column generator_rad is there twice"),
             (
                 "generator_rad\n0\n# x\nNaN\n",
                 "p.csv:4: generator_rad: found \"NaN\", allowed: a number from -10000 to 10000",

@@ -187,7 +187,7 @@ impl Summary {
                 all.extend(value.map(|value| NamedFigure { name, value, unit, decimals, caveat, what }));
             };
         let (arcsec, mpa) = (("arcsec", 3), ("MPa", 1));
-        put("load torque", self.torque_n_m, ("N.m", 3), "", "on the output, positive turns it forward");
+        put("load torque", self.torque_n_m, ("N·m", 3), "", "on the output, positive turns it forward");
         let ripple = "largest less smallest error of a settled stretch one way under one load";
         let of_tips =
             self.tip_contact.filter(TipContact::counts).map(|_| "of tips that bear outside the mesh".to_owned());
@@ -244,7 +244,7 @@ impl Summary {
             }
         });
         let mean = "on the flexspline, positive turns it forward; over whole tooth pitches";
-        put("mean torque of the generator", self.generator_torque_mean_n_m, ("N.m", 4), &without, mean);
+        put("mean torque of the generator", self.generator_torque_mean_n_m, ("N·m", 4), &without, mean);
         let leans = self.tilt_mrad != 0.0 || self.load_across_face_peak_over_mean != 1.0;
         let of_leaning = |value: f64| leans.then_some(value);
         put("largest tilt of the teeth", of_leaning(self.tilt_mrad), ("mrad", 3), "", "along their face, outward");

@@ -55,7 +55,7 @@ pub enum CompletionError {
         keys: Vec<&'static str>,
     },
     /// The table has no torque beyond first contact.
-    #[error("the table ends at {ends_n_m} N.m, which only closes the clearance: allowed are more than {touch_n_m} N.m")]
+    #[error("the table ends at {ends_n_m} N·m, which only closes the clearance: allowed are more than {touch_n_m} N·m")]
     TooShort {
         /// Its largest torque.
         ends_n_m: f64,
@@ -64,7 +64,7 @@ pub enum CompletionError {
     },
     /// A drive that is softer than its sheet.
     #[error(
-        "data_sheet.k{}_n_m_per_rad: found {}, and the FEM has {} N.m/rad there, from {} to {} N.m: a spring in series \
+        "data_sheet.k{}_n_m_per_rad: found {}, and the FEM has {} N·m/rad there, from {} to {} N·m: a spring in series \
          makes no drive stiffer, and the table would be off by the difference beside what units scatter by; allowed: \
          a drive that is as stiff as its sheet in all ranges (catalogues rate a cam), or tables without the sheet",
         range + 1, short(*stated), short(*fem), short(between_n_m[0]), short(between_n_m[1])
@@ -280,11 +280,11 @@ impl Completed {
         let source = self.source.as_deref().unwrap_or("the data sheet");
         let added = |(range, slope): (&str, f64)| match slope {
             0.0 => format!("nothing {range}"),
-            slope => format!("{} N.m/rad {range}", short(1.0 / slope)),
+            slope => format!("{} N·m/rad {range}", short(1.0 / slope)),
         };
         let [a, b, c] = self.spring.compliance_rad_per_n_m;
         let (t1, t2) = (short(self.spring.t1_n_m), short(self.spring.t2_n_m));
-        let ranges = [(&*format!("to {t1} N.m"), a), (&format!("to {t2}"), b), ("above", c)].map(added).join(", ");
+        let ranges = [(&*format!("to {t1} N·m"), a), (&format!("to {t2}"), b), ("above", c)].map(added).join(", ");
         let slip = if self.slip.is_empty() { "" } else { ", and springs that slip for its loss" };
         format!(
             "completed by {source}: the compliance that the FEM lacks is a spring in series ({ranges}){slip}; a unit \
@@ -299,13 +299,13 @@ impl Completed {
     pub fn to_toml(&self, generator: &str) -> String {
         let MissingSpring { t1_n_m, t2_n_m, compliance_rad_per_n_m: [a, b, c] } = self.spring;
         let mut text = format!(
-            "# {generator}: added {a:.4e} rad/(N.m) to {t1_n_m} N.m, {b:.4e} to {t2_n_m} N.m, {c:.4e} above; +-{} % of \
+            "# {generator}: added {a:.4e} rad/(N·m) to {t1_n_m} N·m, {b:.4e} to {t2_n_m} N·m, {c:.4e} above; +-{} % of \
              stiffness\n",
             self.scatter_percent
         );
         for SlipSpring { width_n_m, gain_rad_per_n_m } in &self.slip {
             text +=
-                &format!("# {generator}: a spring that slips at {width_n_m} N.m, {gain_rad_per_n_m:.4e} rad/(N.m)\n");
+                &format!("# {generator}: a spring that slips at {width_n_m} N·m, {gain_rad_per_n_m:.4e} rad/(N·m)\n");
         }
         text
     }
@@ -348,7 +348,7 @@ mod tests {
         let why = spring([Some(62e3), Some(14.3e3), Some(60e3)]).unwrap_err();
         assert_eq!(why, CompletionError::Softer { range: 1, stated: 50e3, fem: 14.3e3, between_n_m: [14.0, 48.0] });
         let said = why.to_string();
-        assert!(said.starts_with("data_sheet.k2_n_m_per_rad: found 50000, and the FEM has 14300 N.m/rad"), "{said}");
+        assert!(said.starts_with("data_sheet.k2_n_m_per_rad: found 50000, and the FEM has 14300 N·m/rad"), "{said}");
         assert_eq!(spring([Some(31e3), Some(49.6e3), None]).unwrap().compliance_rad_per_n_m, [0.0; 3]);
         assert!((spring([Some(62e3), None, None]).unwrap().compliance_rad_per_n_m[0] - 1.0 / 62e3).abs() < 1e-12);
     }

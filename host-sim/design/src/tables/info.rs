@@ -124,12 +124,12 @@ fn short_of_sheet(ends_n_m: f64, rated_n_m: f64, last_n_m: Option<f64>) -> Optio
     }
     let found = match last_n_m {
         Some(last_n_m) if last_n_m < rated_n_m => {
-            format!("the last load with an equilibrium under this generator was {} N.m", short(last_n_m))
+            format!("the last load with an equilibrium under this generator was {} N·m", short(last_n_m))
         }
         _ => format!("--torque-n-m {rated_n_m} asks for it"),
     };
     Some(format!(
-        "the table ends at {} N.m, and the data sheet rates the drive {} N.m: beyond its end a table extrapolates; \
+        "the table ends at {} N·m, and the data sheet rates the drive {} N·m: beyond its end a table extrapolates; \
          {found}",
         short(ends_n_m),
         short(rated_n_m)
@@ -200,16 +200,16 @@ pub enum Source {
 mod tests {
     use super::*;
 
-    /// A table that ends at 32 N.m beside a sheet that rates the drive 52: said, with what was found of that load.
+    /// A table that ends at 32 N·m beside a sheet that rates the drive 52: said, with what was found of that load.
     #[test]
     fn a_table_that_ends_short_of_the_rated_torque_says_so() {
         assert_eq!(short_of_sheet(52.0, 52.0, None), None);
         assert_eq!(short_of_sheet(f64::from(52.1_f32), 52.1, None), None);
         for last_n_m in [None, Some(52.0)] {
             let words = short_of_sheet(32.0, 52.0, last_n_m).unwrap();
-            assert!(words.contains("ends at 32 N.m") && words.ends_with("--torque-n-m 52 asks for it"), "{words}");
+            assert!(words.contains("ends at 32 N·m") && words.ends_with("--torque-n-m 52 asks for it"), "{words}");
         }
         let words = short_of_sheet(3.2, 52.0, Some(20.5)).unwrap();
-        assert!(words.ends_with("under this generator was 20.5 N.m") && !words.contains("asks for"), "{words}");
+        assert!(words.ends_with("under this generator was 20.5 N·m") && !words.contains("asks for"), "{words}");
     }
 }

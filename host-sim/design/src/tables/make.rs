@@ -206,7 +206,7 @@ pub fn make(
         let empirical = drive.contact_wind_up_rad(largest_n_m) * ARCSEC_PER_RAD;
         let [_, whole] = made.info.wind_up_arcsec;
         made.info.remarks.push(format!(
-            "of the wind-up of {whole:.1} arcsec at {largest_n_m} N.m {empirical:.1}, {:.0} %, are empirical \
+            "of the wind-up of {whole:.1} arcsec at {largest_n_m} N·m {empirical:.1}, {:.0} %, are empirical \
              (output.contact_compliance), not FEM",
             100.0 * empirical / whole
         ));

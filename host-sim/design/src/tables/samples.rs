@@ -18,7 +18,7 @@ pub const COLUMNS: [&str; 5] = ["generator_rad", "torque_n_m", "temperature_c", 
 /// Largest sizes that a sample may have: beyond them a unit is wrong, not the drive unusual.
 const LIMITS: [(&str, f64, &str); 4] = [
     ("generator_rad", 1e6, "rad"),
-    ("torque_n_m", 1e5, "N.m"),
+    ("torque_n_m", 1e5, "N·m"),
     ("temperature_c", 1e3, "°C"),
     ("output_rad", 1e6, "rad"),
 ];

@@ -7,7 +7,7 @@
 //! Frictionless flanks leave nothing but the drag of the output to distinguish the directions: the flanks carry `T - d`
 //! in forward and `T + d` in backward motion, and the state is an elastic one that depends on nothing else. So one
 //! torque sign is enough too: from a forward state under T the backward one follows by the compliance c of the output,
-//! `e_backward(psi, T) = e_forward(psi, T) + 2 d c`. The drag is small (0.02 N.m; the second order is below 0.05″).
+//! `e_backward(psi, T) = e_forward(psi, T) + 2 d c`. The drag is small (0.02 N·m; the second order is below 0.05″).
 
 use std::ops::ControlFlow;
 

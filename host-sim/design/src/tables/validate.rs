@@ -139,7 +139,7 @@ pub enum ValidateError {
     #[error("the table names no generator that can be simulated")]
     UnknownGenerator,
     /// The core gave no correction where it should.
-    #[error("the table gives no correction at {torque_n_m} N.m and {temperature_c} °C")]
+    #[error("the table gives no correction at {torque_n_m} N·m and {temperature_c} °C")]
     Disabled {
         /// Torque, N m.
         torque_n_m: f64,

@@ -14,7 +14,7 @@ pub enum FlyError {
     #[error("{0}")]
     Scenario(Problem),
     /// The drive does not carry the load.
-    #[error("load: found up to {largest_n_m:.1} N.m, allowed: {most_n_m} N.m with {of}")]
+    #[error("load: found up to {largest_n_m:.1} N·m, allowed: {most_n_m} N·m with {of}")]
     Load {
         /// Largest load of the scenario, N·m.
         largest_n_m: f64,

@@ -221,7 +221,7 @@ fn read_table(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Flown> {
     }
     let [gust_n_m, gust_hz] = scenario.load.gust;
     if gust_n_m > 0.0 && gust_hz < SLOWEST_GUST_HZ {
-        let allowed = format!("{SLOWEST_GUST_HZ} to 50 for gusts above 0 N.m");
+        let allowed = format!("{SLOWEST_GUST_HZ} to 50 for gusts above 0 N·m");
         refuse("load.gust", format!("found a corner of {gust_hz} Hz, allowed: {allowed}"));
     }
     Some(flown)
@@ -329,7 +329,7 @@ mod tests {
             ("legs = []", "own.toml:2: legs: found 0 s in all, allowed: 3 to 3600 s"),
             (
                 "load.gust = [1.0, 0.0]",
-                "own.toml:2: load.gust: found a corner of 0 Hz, allowed: 0.001 to 50 for gusts above 0 N.m",
+                "own.toml:2: load.gust: found a corner of 0 Hz, allowed: 0.001 to 50 for gusts above 0 N·m",
             ),
         ] {
             let found = said(&format!("base = \"camera\"\n{text}\n"));

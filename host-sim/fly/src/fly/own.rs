@@ -27,7 +27,7 @@ pub enum OwnTableError {
         warmest_c: f64,
     },
     /// A table whose error does not grow with the load: it was made of too few samples to be a spring.
-    #[error("the table has no wind-up from {from_n_m} to {to_n_m} N.m; allowed for a joint: a drive that gives way")]
+    #[error("the table has no wind-up from {from_n_m} to {to_n_m} N·m; allowed for a joint: a drive that gives way")]
     Rigid {
         /// Half of its largest torque, N·m.
         from_n_m: f64,

@@ -205,7 +205,7 @@ impl Model {
             return Ok(());
         }
         Err(CalibrationError::Known(format!(
-            "torque: found {by:.1} arcsec of the output from {low:.2} to {high:.2} N.m; allowed: a torque that is \
+            "torque: found {by:.1} arcsec of the output from {low:.2} to {high:.2} N·m; allowed: a torque that is \
              positive where it turns the output forward, so that the error grows with it. --columns torque=NAME:-N.m \
              turns its sign"
         )))
@@ -834,8 +834,8 @@ impl Fitted {
                 let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
                 let without = folds.left_out(&all, &others);
                 let why = format!(
-                    "it takes {:.1} % of the squares that the others leave ({:.0} % are asked for); without it the \
-                     error where nothing was fitted is {:.2} times as large",
+                    "explains {:.1} % of the remaining variance (threshold {:.0} %); without it the held-out error is \
+                     {:.2} times as large",
                     percent((without - with) / without),
                     percent(LEAST_GAIN),
                     (without / with).sqrt()
@@ -845,10 +845,10 @@ impl Fitted {
                 let (_, left) = best_penalty(folds, &all, &model.chosen, Chosen { part, penalty: 0.0 });
                 let share = (with - left) / with;
                 let why = if share > LEAST_GAIN {
-                    "it gains in the rows it was chosen on, not where it was not".to_owned()
+                    "reduces the error in the rows it was chosen on, not in those held out".to_owned()
                 } else {
                     format!(
-                        "it would take {:.1} % of the squares that the others leave; {:.0} % are asked for",
+                        "would explain {:.1} % of the remaining variance (threshold {:.0} %)",
                         percent(share),
                         percent(LEAST_GAIN)
                     )

@@ -174,7 +174,7 @@ impl Recorded {
         match part {
             PartName::WindUp if !self.has_torque => Some("no torque was recorded".to_owned()),
             PartName::WindUp if high - low < super::SAME_TORQUE * low.abs().max(high.abs()) || high <= low => {
-                Some(format!("the torque keeps to {high:.3} N.m"))
+                Some(format!("the torque keeps to {high:.3} N·m"))
             }
             PartName::WindUp if self.each_keeps_to_one_load => {
                 Some("each log keeps to one load, which is as good as a zero of the output".to_owned())

@@ -259,9 +259,9 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     if let Some((unit, (_, effect))) = best.as_ref().and_then(|best| Some((unit_of(best.0)?, best))) {
         // A stiffness that looks like another unit is a look, no word: a soft drive does the same.
         let what = format!(
-            "the torque leaves {:.0} arcsec as it stands, and {:.0} if it is in {unit}: nothing says so, and it is \
-             not converted; if it is, say --columns torque=NAME:{unit}, else the drive is not as stiff as its model \
-             says; what the load does cannot be told from what the drive does",
+            "the residual is {:.0} arcsec with the torque as given, {:.0} if it is in {unit}: nothing says so, and it \
+             is not converted; if it is, say --columns torque=NAME:{unit}, else the drive is not as stiff as its model \
+             says; load and drive are indistinguishable",
             recorded.left, effect.left
         );
         recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
@@ -285,7 +285,7 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
     let what = format!(
         "the torque should move the error by {:.0} arcsec rms, and it shows {:.2} (± {:.2}) of that: it is not the \
-         torque at this output, and is not used; what the load does cannot be told from what the drive does",
+         torque at this output, and is not used; load and drive are indistinguishable",
         recorded.size, recorded.share, recorded.std
     );
     report(recording, FaultName::TorqueScale, Treatment::Masked, recorded.size, what.clone());

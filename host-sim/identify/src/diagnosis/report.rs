@@ -240,7 +240,7 @@ impl Hint {
     pub(super) fn of(name: CauseName, gain: f64) -> Hint {
         let (gain_percent, least) = (100.0 * gain, 100.0 * LEAST_GAIN_OF_A_NAME);
         let why_not_a_cause =
-            format!("it takes {gain_percent:.1} % of the rms in sessions left out; a cause takes {least:.0} %");
+            format!("it reduces the held-out rms by {gain_percent:.1} %; a cause by {least:.0} % at least");
         Hint { name, gain, why_not_a_cause }
     }
 }
@@ -280,7 +280,7 @@ impl Diagnosis {
             Verdict::None => "nothing beyond noise and unit-to-unit spread",
             Verdict::Explained => "explained",
             Verdict::PartlyExplained => "partly explained",
-            Verdict::Unknown if self.finding == Finding::DataUnusable => "none that these data bear",
+            Verdict::Unknown if self.finding == Finding::DataUnusable => "these data support none",
             Verdict::Unknown => "a discrepancy that no known cause explains",
         };
         let _ = writeln!(text, "finding: {}", self.finding.words());
@@ -300,26 +300,25 @@ impl Diagnosis {
             let alike = cause.look_alikes.iter().map(|alike| alike.as_str().to_owned());
             let alike: Vec<String> = alike.chain(cause.outside_the_library()).collect();
             if !alike.is_empty() {
-                let _ = writeln!(text, "    cannot be told from: {}", alike.join(", "));
+                let _ = writeln!(text, "    indistinguishable from: {}", alike.join(", "));
             }
         }
         for Hint { name, why_not_a_cause, .. } in &self.hints {
-            let _ = writeln!(text, "  a hint, no cause: {name}, {why_not_a_cause}");
+            let _ = writeln!(text, "  hint only: {name}, {why_not_a_cause}");
         }
         for left in &self.unexplained {
             let _ = writeln!(text, "  without a cause: {}, {:.1} arcsec rms", left.looks_like, left.size_arcsec);
         }
         let (r, h) = (&self.residual, &self.held_out);
-        let _ =
-            writeln!(text, "the model behind it is adapted to these data, which a table on board is not; it leaves");
+        let _ = writeln!(text, "residual after stiffness, backlash and offsets are fitted to these data, arcsec rms");
         let _ = writeln!(
             text,
-            "  in data left out: {:.2} -> {:.2} arcsec rms, without the causes and with them",
+            "  held out: {:.2} without the causes, {:.2} with them",
             h.rms_before_arcsec, h.rms_after_arcsec
         );
         let _ = writeln!(
             text,
-            "  in the data it was fitted to{}: {:.2} -> {:.2}, of which {:.2} is noise",
+            "  fitted data{}: {:.2} without the causes, {:.2} with them, of which {:.2} is noise",
             if r.rows_averaged > 1 { format!(", means of {} rows", r.rows_averaged) } else { String::new() },
             r.rms_before_arcsec,
             r.rms_after_arcsec,
@@ -381,8 +380,8 @@ mod tests {
 
     #[test]
     fn a_name_that_gains_too_little_is_a_hint() {
-        assert!(Hint::of(CauseName::Wear, 0.02).why_not_a_cause.contains("it takes 2.0 % of the rms"));
-        assert!(Hint::of(CauseName::Wear, -0.1).why_not_a_cause.contains("it takes -10.0 %"));
+        assert!(Hint::of(CauseName::Wear, 0.02).why_not_a_cause.contains("it reduces the held-out rms by 2.0 %"));
+        assert!(Hint::of(CauseName::Wear, -0.1).why_not_a_cause.contains("rms by -10.0 %"));
     }
 
     #[test]

@@ -45,11 +45,11 @@ impl Stage {
         match self {
             Stage::Data => "the data",
             Stage::Tried => "tried at many places",
-            Stage::Forward => "refined beside the causes chosen before",
+            Stage::Forward => "refined together with the causes chosen before",
             Stage::Backward => "held against what was chosen after it",
             Stage::Exchange => "tried in the place of another cause",
             Stage::Settled => "at the end of the search",
-            Stage::Understood => "beside what has no name",
+            Stage::Understood => "together with unnamed terms",
             Stage::Rival => "against its rivals",
             Stage::Verdict => "the verdict",
         }
@@ -123,7 +123,7 @@ impl Gate {
             Gate::Tolerance => {
                 "takes a parameter of the nominal model out of its tolerance (standard deviations between units)"
             }
-            Gate::Room => "finds room beside the laws chosen already",
+            Gate::Room => "finds room next to the models chosen already",
             Gate::Refined => "gains as much evidence, not yet refined, as the laws that are refined",
             Gate::Sense => "has signs and sizes that make sense",
             Gate::Deviations => "is larger than its own deviations (their share of it)",
@@ -146,9 +146,9 @@ impl Gate {
                 "does not stand beside a line in time near its frequency that nothing in the drive drives (its size as \
                  a share of the cause)"
             }
-            Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
-            Gate::ToldFromZero => "has a size that is told from zero (times its standard deviation)",
-            Gate::ToldApart => "is told apart from a rival (rise of the misfit with the rival in its place)",
+            Gate::KnownWell => "is well determined next to unnamed terms (times its own uncertainty)",
+            Gate::ToldFromZero => "has a size that differs from zero (times its standard deviation)",
+            Gate::ToldApart => "is distinguishable from a rival (rise of the misfit with the rival in its place)",
             Gate::AsRival => "tells the data better in the place of a cause that was named (rise of the misfit)",
             Gate::NoWorse => "predicts sessions left out, with the others named (arcsec rms)",
         }

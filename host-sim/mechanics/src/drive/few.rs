@@ -143,7 +143,7 @@ impl FewNumbers {
         made.put("generator.roller_diameter_mm", roller_mm, "0.557 bore radii, as HHD-95");
         // Not rounded as sizes are: the drag of a small drive would be none, and nothing would hold its output.
         made.drive.output.drag_torque_n_m = three_digits(like.output.drag_torque_n_m * scale.powi(3));
-        made.formulas.push(("output.drag_torque_n_m", "0.02 N.m of HHD-95, with the cube of the diameter".to_owned()));
+        made.formulas.push(("output.drag_torque_n_m", "0.02 N·m of HHD-95, with the cube of the diameter".to_owned()));
         made.drive.circular_spline.profile_shift = self.shift(&made.drive)?;
         let why = format!(
             "solved: a rigid backlash of 1 arcmin with the {} generator, and teeth that clear under all four",
@@ -250,7 +250,7 @@ mod tests {
     fn a_small_drive_has_drag() {
         let drag = few(60, 0.1).drive("d").unwrap().drive.output.drag_torque_n_m;
         let expected = 0.02 * (0.5 * 0.1 * 60.0 / 47.0_f64).powi(3);
-        assert!((drag / expected - 1.0).abs() < 5e-3, "{drag} N.m, expected {expected}");
+        assert!((drag / expected - 1.0).abs() < 5e-3, "{drag} N·m, expected {expected}");
     }
 
     #[test]

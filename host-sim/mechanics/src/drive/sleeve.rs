@@ -149,7 +149,7 @@ section! {
     /// Torsional stiffness, N·m/rad, of springs in place of the sleeve, or of what holds a sleeve of shells; `None` is
     /// rigid.
     torsion_stiffness_n_m_per_rad: RealOrRigid, above(0.0, 1.0e12),
-        "torsional stiffness of springs, or of what holds shells, N.m/rad";
+        "torsional stiffness of springs, or of what holds shells, N·m/rad";
     /// Lateral stiffness of springs in place of the sleeve, N/mm; 0 leaves the rim to the generator.
     lateral_stiffness_n_per_mm: Real, from(0.0, 1.0e9), "lateral stiffness of springs, rim to flange, N/mm";
 }

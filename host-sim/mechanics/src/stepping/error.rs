@@ -15,7 +15,7 @@ pub enum SolveError {
     Mesh(#[from] MeshError),
     /// Newton did not converge, not even in the smallest increment.
     #[error(
-        "{} at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}{}{}",
+        "{} at generator angle {generator_rad:.6} rad, load {torque_n_m} N·m: {reason}{}{}",
         if softened_to.is_some() { GIVES_WAY } else { UNSOLVED },
         beyond(*torque_n_m, *reached_n_m),
         meaning(*torque_n_m, *softened_to)
@@ -38,7 +38,7 @@ pub enum SolveError {
     },
     /// The load pushes the rim out of the range of the model.
     #[error(
-        "at generator angle {generator_rad:.6} rad and load {torque_n_m} N.m the rim leaves the range of the model: \
+        "at generator angle {generator_rad:.6} rad and load {torque_n_m} N·m the rim leaves the range of the model: \
          {what}"
     )]
     OutOfRange {
@@ -52,7 +52,7 @@ pub enum SolveError {
     /// The output does not follow the generator.
     #[error(
         "the drive has not settled after {pitches:.1} tooth pitches of motion one way, at generator angle \
-         {generator_rad:.4} rad and load {torque_n_m} N.m: in the last increment the output turned by {rate:.3} of \
+         {generator_rad:.4} rad and load {torque_n_m} N·m: in the last increment the output turned by {rate:.3} of \
          what the ratio says; check the clearance between the teeth, or the drag, of the drive"
     )]
     NotSettled {
@@ -85,7 +85,7 @@ fn meaning(torque_n_m: f64, softened_to: Option<f64>) -> String {
 
 /// The last load that there was an equilibrium for, where a load came on.
 fn beyond(torque_n_m: f64, reached_n_m: f64) -> String {
-    if torque_n_m == reached_n_m { String::new() } else { format!("; the last load with one is {reached_n_m:.4} N.m") }
+    if torque_n_m == reached_n_m { String::new() } else { format!("; the last load with one is {reached_n_m:.4} N·m") }
 }
 
 impl SolveError {

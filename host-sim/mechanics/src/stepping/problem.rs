@@ -74,9 +74,9 @@ pub struct SolverSettings {
     pub refine: usize,
     /// Contact penalty on the bore, N/mm³; `None` chooses by generator: 1e7 under rollers, whose contact is narrow and
     /// hard pressed, 1e6 under discs and cam, which conform to the bore. Ten times more moves the output of HHD-95 at
-    /// 50 N.m by 0.02″ (cam), 0.01″ (double disc), 0.07″ (two-roller).
+    /// 50 N·m by 0.02″ (cam), 0.01″ (double disc), 0.07″ (two-roller).
     pub bore_penalty: Option<f64>,
-    /// Contact penalty on the flanks, N/mm³. Twice as much moves the output of HHD-95 at 50 N.m by 0.01″ (cam) to 0.04″
+    /// Contact penalty on the flanks, N/mm³. Twice as much moves the output of HHD-95 at 50 N·m by 0.01″ (cam) to 0.04″
     /// (two-roller).
     pub flank_penalty: f64,
     /// Integration points in each bore edge; `None` chooses by generator: 48 under rollers (a point every 4 µm; 16
@@ -121,7 +121,7 @@ impl Default for SolverSettings {
     }
 }
 
-/// Torsional stiffness of the drag while the output sticks, N mm/rad per mm of width: 0.02 N.m on 20 mm is reached
+/// Torsional stiffness of the drag while the output sticks, N mm/rad per mm of width: 0.02 N·m on 20 mm is reached
 /// after 1e-9 rad (0.0002″), which is invisible.
 const DRAG_STICK_STIFFNESS: f64 = 1e9;
 

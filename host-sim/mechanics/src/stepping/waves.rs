@@ -245,7 +245,7 @@ mod tests {
         }
         let mean = places[8..].iter().map(|place| place.increment.generator_torque_n_m).sum::<f64>() / 8.0;
         let expected = (drive.output.drag_torque_n_m - 50.0) / drive.ratio();
-        assert!((mean - expected).abs() < 1e-4, "{mean} N.m, expected {expected}");
+        assert!((mean - expected).abs() < 1e-4, "{mean} N·m, expected {expected}");
     }
 
     /// Mirrored in the axis of a tooth: the same drive under the opposite load, turned the other way, errs by the
@@ -284,7 +284,7 @@ mod tests {
     #[test]
     #[ignore = "long: tests/run slow"]
     fn leaning_teeth_lose_nothing() {
-        // The ripple of a cup, which bears on single edges, is sampled less well: 5.5e-4 N.m by 8 places, 2e-4 by 16.
+        // The ripple of a cup, which bears on single edges, is sampled less well: 5.5e-4 N·m by 8 places, 2e-4 by 16.
         for (drive, per_pitch, tilt, within) in [
             (sliced(Drive::hhd_95_hermetic(), 0.0), 8, 0.68e-3, 2e-5),
             (sliced(Drive::cup_95(), 3.0), 16, 5.53e-3, 5e-4),
@@ -298,7 +298,7 @@ mod tests {
                 / per_pitch as f64;
             let expected = (0.02 - 50.0) / 95.0;
             println!("{}: {mean} {expected}", drive.name);
-            assert!((mean - expected).abs() < within, "{}: {mean} N.m, expected {expected}", drive.name);
+            assert!((mean - expected).abs() < within, "{}: {mean} N·m, expected {expected}", drive.name);
             let face = places[per_pitch].increment.face;
             assert!((face.tilt_rad / tilt - 1.0).abs() < 0.02 && face.peak_over_mean > 1.5, "{face:?}");
         }
@@ -467,8 +467,8 @@ mod tests {
             // on.
             let mean = places[8..].iter().map(|place| place.increment.generator_torque_n_m).sum::<f64>() / 8.0;
             let expected = (drive.output.drag_torque_n_m - 200.0) / drive.ratio();
-            println!("{kind}: {mean} {expected} N.m, {} flanks", places[8].increment.flank_contacts);
-            assert!((mean / expected - 1.0).abs() < 5e-4, "{kind}: {mean} N.m, expected {expected}");
+            println!("{kind}: {mean} {expected} N·m, {} flanks", places[8].increment.flank_contacts);
+            assert!((mean / expected - 1.0).abs() < 5e-4, "{kind}: {mean} N·m, expected {expected}");
             let share = places[8].increment.flank_contacts as f64 / 188.0;
             assert!((least..most).contains(&share), "{kind}: {share}");
         }

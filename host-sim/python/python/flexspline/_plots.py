@@ -53,7 +53,7 @@ def simulation(run: Simulation, ax: Axes | None) -> Axes:
 def replay(rows: Replay, ax: Axes | None) -> Axes:
     ax = _axes(ax)
     ax.plot(rows.generator_rad, rows.measured_arcsec, ".", markersize=2, label="as measured")
-    ax.plot(rows.generator_rad, rows.residual_arcsec, ".", markersize=2, label="left by the table")
+    ax.plot(rows.generator_rad, rows.residual_arcsec, ".", markersize=2, label="residual")
     return _labelled(ax, "generator angle, rad", "error at the output, arcsec", f"table {rows.summary.table_id}")
 
 
@@ -85,7 +85,7 @@ def calibration(made: Calibration, ax: Axes | None) -> Axes:
     ax = _axes(ax)
     output = np.degrees(made.shown.output_rad)
     ax.plot(output, made.shown.measured_arcsec, ".", markersize=2, label="as measured")
-    ax.plot(output, made.shown.left_arcsec, ".", markersize=2, label="left by the table")
+    ax.plot(output, made.shown.left_arcsec, ".", markersize=2, label="residual")
     return _labelled(ax, "output angle, deg", "error at the output, arcsec", f"calibration, table {made.table.table_id}")
 
 
@@ -94,7 +94,7 @@ def diagnosis(found: Diagnosis, ax: Axes | None) -> Axes:
     rows = found.rows
     timed = bool(np.isfinite(rows.time_s).all())
     x = rows.time_s if timed else np.arange(rows.rows)
-    ax.plot(x, rows.error_arcsec - rows.recalibrated_arcsec, ".", markersize=2, label="left by the nominal model")
+    ax.plot(x, rows.error_arcsec - rows.recalibrated_arcsec, ".", markersize=2, label="residual of the nominal model")
     if found.causes:
         ax.plot(x, rows.error_arcsec - rows.extended_arcsec, ".", markersize=2, label="left with the causes")
     named = ", ".join(cause.name for cause in found.causes) or found.finding.replace("_", " ")

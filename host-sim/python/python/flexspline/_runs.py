@@ -201,11 +201,11 @@ class Calibration(Fields):
     """A unit's table from its logs: the fields of ``calibration.json``, ``table``, and ``shown``."""
 
     held_out: Fields
-    """rms_before_arcsec, rms_prior_arcsec, rms_after_arcsec where nothing was fitted."""
+    """rms_before_arcsec, rms_prior_arcsec, rms_after_arcsec, held out."""
     parts: list[Fields]
     """What was fitted: name, kept, held_out_gain, size_arcsec, why."""
     half_width_arcsec: float
-    """The table holds the error to this either way (95 %), arcsec."""
+    """Half-width of the 95 % interval of the error with the table, arcsec."""
     data_faults: list[Fields]
     notes: list[str]
     table: Table
@@ -232,7 +232,7 @@ class Calibration(Fields):
 
     def __repr__(self) -> str:
         held = self.held_out
-        left = f"{held.rms_before_arcsec:.3g} -> {held.rms_after_arcsec:.3g} arcsec rms where nothing was fitted"
+        left = f"{held.rms_before_arcsec:.3g} -> {held.rms_after_arcsec:.3g} arcsec rms held out"
         return f"Calibration({left}, held to +-{self.half_width_arcsec:.3g}, table {self.table.table_id})"
 
 
@@ -274,7 +274,7 @@ def calibrate(
     made = Calibration(text, Table._made(parts), Columns(rows))
     if made.half_width_arcsec > made.held_out.rms_before_arcsec:
         warnings.warn(
-            f"calibrate: the table holds the error to +-{made.half_width_arcsec:.3g} arcsec, where {made.held_out.rms_before_arcsec:.3g} rms "
+            f"calibrate: error with the table +-{made.half_width_arcsec:.3g} arcsec (95 % interval), where {made.held_out.rms_before_arcsec:.3g} rms "
             "were measured; more or calmer rows make it narrower",
             stacklevel=2,
         )

@@ -182,7 +182,7 @@ class Replay(Columns):
         self.summary = summary
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Error as measured and as left by the table, arcsec, over the generator angle, rad; needs matplotlib."""
+        """Error as measured, and residual with the table, arcsec, over the generator angle, rad; needs matplotlib."""
         from . import _plots
 
         return _plots.replay(self, ax)
@@ -486,7 +486,7 @@ class Table:
     def __repr__(self) -> str:
         low, high = self.torque_range_n_m
         cold, warm = self.temperature_range_c
-        return f"Table({self.table_id}, {self.generator}, ratio {self.ratio:g}, {low:g} to {high:g} N.m, {cold:g} to {warm:g} C)"
+        return f"Table({self.table_id}, {self.generator}, ratio {self.ratio:g}, {low:g} to {high:g} N·m, {cold:g} to {warm:g} C)"
 
     def _repr_html_(self) -> str:
         plain = {name: value for name, value in self.header.json.items() if not name.endswith(("nodes_n_m", "nodes_c"))}

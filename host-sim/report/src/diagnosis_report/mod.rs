@@ -289,7 +289,7 @@ impl DiagnosisKnown<'_> {
         let levels = self.shown.iter().map(|shown| &shown.level).zip([5, 0, 1]);
         let mut blocks = vec![over_time(
             "over-time",
-            "What each model leaves, over time",
+            "Residual of each model over time",
             "Least and largest of each stretch of rows, so that single rows show. Nominal: the model as it was given. \
              Recalibrated: its zero, stiffness, backlash and harmonics as this unit has them, within the spread \
              between units. With the causes: what was named is in the model. Breaks between sessions are taken out.",

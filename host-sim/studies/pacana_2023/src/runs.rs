@@ -150,7 +150,7 @@ pub(crate) fn run_all(
     let total = runs.iter().map(|run| if run.settings.increment_rad.is_some() { 602 } else { 302 }).sum();
     let done = AtomicUsize::new(0);
     runs.par_iter_mut().with_max_len(1).try_for_each(|run| {
-        let note = format!("{}, {} N.m, {}", run.generator, run.torque_n_m, run.variant);
+        let note = format!("{}, {} N·m, {}", run.generator, run.torque_n_m, run.variant);
         run.status = match solve(drive, run, &|| observe(done.fetch_add(1, Ordering::Relaxed) + 1, total, &note)) {
             Err(error) if error.is_bad_input() => return Err(error),
             Err(error) => error.to_string(),
