@@ -538,7 +538,7 @@ impl Drive {
     }
 
     /// BLAKE3 of the physics: every field and the thermal state, in a fixed order and binary form. The name and the
-    /// formatting of the file take no part.
+    /// formatting of the file take no part, nor does the compliance in series, which is no FEM.
     pub fn hash(&self) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"flexspline drive 1\n");
@@ -547,8 +547,9 @@ impl Drive {
             if (field.is_imperfection() || field.is_of_the_face() || field.is_of_the_profile()) && slot.is_zero() {
                 return;
             }
-            // and so do the sizes of a sleeve that springs stand for
-            if field.is_of_shells() && !self.sleeve.is_shell() {
+            // and so do the sizes of a sleeve that springs stand for, and what a data sheet takes the place of
+            let in_series = field.path == "output.contact_compliance";
+            if in_series || field.is_of_shells() && !self.sleeve.is_shell() {
                 return;
             }
             hasher.update(field.path.as_bytes());
@@ -713,7 +714,8 @@ mod tests {
         assert!((found[0] / 0.94 - 1.0).abs() < 0.1 && (found[1] / 1.38 - 1.0).abs() < 0.1, "{found:?}");
         assert_eq!(high.contact_wind_up_rad(-15.625), -high.contact_wind_up_rad(15.625));
         assert!((arcmin(&high, 8.0 * 15.625) / found[0] - 4.0).abs() < 1e-9);
-        assert_ne!(high.hash(), of(200).with_set("output.contact_compliance=0").unwrap().hash());
+        // A table that a data sheet completed is of the drive that has the compliance in place of the sheet.
+        assert_eq!(high.hash(), of(200).with_set("output.contact_compliance=0").unwrap().hash());
     }
 
     #[test]
