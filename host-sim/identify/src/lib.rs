@@ -6,6 +6,28 @@
 //! torque from two encoders, [`nominal`] is a drive known from a catalogue alone.
 #![forbid(unsafe_code)]
 
+/// An enum whose variants each have a row of properties, which its method `row` gives; `ALL` has each in its order.
+macro_rules! table {
+    ($(#[$meta:meta])* $vis:vis enum $Name:ident: $Row:ty { $($(#[$doc:meta])* $variant:ident = $row:expr,)* }) => {
+        $(#[$meta])*
+        $vis enum $Name {
+            $($(#[$doc])* $variant,)*
+        }
+
+        impl $Name {
+            /// Each of them.
+            #[allow(dead_code, reason = "not every table is gone through")]
+            $vis const ALL: [$Name; [$($Name::$variant),*].len()] = [$($Name::$variant),*];
+
+            const fn row(self) -> $Row {
+                match self {
+                    $($Name::$variant => $row,)*
+                }
+            }
+        }
+    };
+}
+
 pub mod calibrate;
 pub mod causes;
 pub mod diagnosis;

@@ -5,80 +5,64 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-macro_rules! names {
-    ($($name:ident = $text:literal,)*) => {
-        /// The name of a parameter; the unit is its end.
-        #[allow(missing_docs, reason = "the names say it")]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub enum ParameterName {
-            $($name,)*
-        }
-
-        impl ParameterName {
-            /// As it stands in files.
-            #[must_use]
-            pub const fn as_str(self) -> &'static str {
-                match self {
-                    $(ParameterName::$name => $text,)*
-                }
-            }
-        }
-    };
-}
-
-names! {
-    AmplitudeArcsec = "amplitude_arcsec",
-    AmplitudeUm = "amplitude_um",
-    AngleRad = "angle_rad",
-    ArcsecPerHour = "arcsec_per_hour",
-    BendPerK = "bend_per_k",
-    Channel = "channel",
-    ClearanceArcsecPerK = "clearance_arcsec_per_k",
-    DampingRatio = "damping_ratio",
-    DeeperArcsec = "deeper_arcsec",
-    DelayS = "delay_s",
-    DepthUm = "depth_um",
-    DragBendPerK = "drag_bend_per_k",
-    DragNM = "drag_n_m",
-    DurationS = "duration_s",
-    Encoder = "encoder",
-    Events = "events",
-    EveryRows = "every_rows",
-    Exponent = "exponent",
-    FrequencyHz = "frequency_hz",
-    FullLoadNM = "full_load_n_m",
-    Gain = "gain",
-    GeneratorAmplitudeArcsec = "generator_amplitude_arcsec",
-    GrowthArcsec = "growth_arcsec",
-    HalfLashArcsec = "half_lash_arcsec",
-    HalfLoadNM = "half_load_n_m",
-    HalfWidthArcsec = "half_width_arcsec",
-    HardeningArcsec = "hardening_arcsec",
-    HardeningExponent = "hardening_exponent",
-    Harmonic = "harmonic",
-    JitterMs = "jitter_ms",
-    JumpArcsec = "jump_arcsec",
-    LagS = "lag_s",
-    PerK = "per_k",
-    PhaseRad = "phase_rad",
-    PressedArcsec = "pressed_arcsec",
-    RatioRelativeError = "ratio_relative_error",
-    RelativeDragPerK = "relative_drag_per_k",
-    Share = "share",
-    SizeArcsec = "size_arcsec",
-    SizeUm = "size_um",
-    SlipTorqueNM = "slip_torque_n_m",
-    SpeedExponent = "speed_exponent",
-    StepArcsec = "step_arcsec",
-    StepS = "step_s",
-    StiffnessRatio = "stiffness_ratio",
-    StiffnessRelativePerK = "stiffness_relative_per_k",
-    TimeS = "time_s",
-    Tooth = "tooth",
-    TorqueNM = "torque_n_m",
-    Turns = "turns",
-    Wheel = "wheel",
-    WidthRad = "width_rad",
+table! {
+    /// The name of a parameter; the unit is its end.
+    #[allow(missing_docs, reason = "the names say it")]
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub enum ParameterName: &'static str {
+        AmplitudeArcsec = "amplitude_arcsec",
+        AmplitudeUm = "amplitude_um",
+        AngleRad = "angle_rad",
+        ArcsecPerHour = "arcsec_per_hour",
+        BendPerK = "bend_per_k",
+        Channel = "channel",
+        ClearanceArcsecPerK = "clearance_arcsec_per_k",
+        DampingRatio = "damping_ratio",
+        DeeperArcsec = "deeper_arcsec",
+        DelayS = "delay_s",
+        DepthUm = "depth_um",
+        DragBendPerK = "drag_bend_per_k",
+        DragNM = "drag_n_m",
+        DurationS = "duration_s",
+        Encoder = "encoder",
+        Events = "events",
+        EveryRows = "every_rows",
+        Exponent = "exponent",
+        FrequencyHz = "frequency_hz",
+        FullLoadNM = "full_load_n_m",
+        Gain = "gain",
+        GeneratorAmplitudeArcsec = "generator_amplitude_arcsec",
+        GrowthArcsec = "growth_arcsec",
+        HalfLashArcsec = "half_lash_arcsec",
+        HalfLoadNM = "half_load_n_m",
+        HalfWidthArcsec = "half_width_arcsec",
+        HardeningArcsec = "hardening_arcsec",
+        HardeningExponent = "hardening_exponent",
+        Harmonic = "harmonic",
+        JitterMs = "jitter_ms",
+        JumpArcsec = "jump_arcsec",
+        LagS = "lag_s",
+        PerK = "per_k",
+        PhaseRad = "phase_rad",
+        PressedArcsec = "pressed_arcsec",
+        RatioRelativeError = "ratio_relative_error",
+        RelativeDragPerK = "relative_drag_per_k",
+        Share = "share",
+        SizeArcsec = "size_arcsec",
+        SizeUm = "size_um",
+        SlipTorqueNM = "slip_torque_n_m",
+        SpeedExponent = "speed_exponent",
+        StepArcsec = "step_arcsec",
+        StepS = "step_s",
+        StiffnessRatio = "stiffness_ratio",
+        StiffnessRelativePerK = "stiffness_relative_per_k",
+        TimeS = "time_s",
+        Tooth = "tooth",
+        TorqueNM = "torque_n_m",
+        Turns = "turns",
+        Wheel = "wheel",
+        WidthRad = "width_rad",
+    }
 }
 
 /// Kinds of parameters.
@@ -93,6 +77,12 @@ pub enum Kind {
 }
 
 impl ParameterName {
+    /// As it stands in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        self.row()
+    }
+
     /// Its kind.
     #[must_use]
     pub const fn kind(self) -> Kind {

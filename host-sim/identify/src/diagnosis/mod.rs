@@ -226,8 +226,8 @@ impl<'a> Search<'a> {
         laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.contains(&cause)));
         let mut trace = Trace::new(settings.verbose);
         for cause in CauseName::ALL {
-            if let Some(need) = on.lacks(*cause) {
-                trace.decided(Stage::Data, (*cause).into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
+            if let Some(need) = on.lacks(cause) {
+                trace.decided(Stage::Data, cause.into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
             }
         }
         // Rows to an average that leave about as many averages as asked for, unless they hide something.

@@ -14,45 +14,37 @@ use serde::ser::Serializer;
 use super::candidate::{Label, Law};
 use crate::causes::{CauseName, Need, ParameterName};
 
-/// Where in the search a decision fell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stage {
-    /// Before the search: can these data speak of the cause at all?
-    Data,
-    /// A law is tried at many places, none of them refined.
-    Tried,
-    /// Laws are refined, and compared beside those chosen before.
-    Forward,
-    /// A law that was chosen has to earn its place again beside a later one.
-    Backward,
-    /// A law is tried in the place of one that was chosen.
-    Exchange,
-    /// How a law that was chosen stands when the search is over.
-    Settled,
-    /// What has no name beside a cause must not be too large.
-    Understood,
-    /// Every rival is refitted in the place of a cause.
-    Rival,
-    /// The verdict over all causes together.
-    Verdict,
+table! {
+    /// Where in the search a decision fell.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Stage: &'static str {
+        /// Before the search: can these data speak of the cause at all?
+        Data = "the data",
+        /// A law is tried at many places, none of them refined.
+        Tried = "tried at many places",
+        /// Laws are refined, and compared beside those chosen before.
+        Forward = "refined beside the causes chosen before",
+        /// A law that was chosen has to earn its place again beside a later one.
+        Backward = "held against what was chosen after it",
+        /// A law is tried in the place of one that was chosen.
+        Exchange = "tried in the place of another cause",
+        /// How a law that was chosen stands when the search is over.
+        Settled = "at the end of the search",
+        /// What has no name beside a cause must not be too large.
+        Understood = "beside what has no name",
+        /// Every rival is refitted in the place of a cause.
+        Rival = "against its rivals",
+        /// The verdict over all causes together.
+        Verdict = "the verdict",
+    }
 }
 
 impl Stage {
     /// Its words for a reader.
     #[must_use]
     pub const fn words(self) -> &'static str {
-        match self {
-            Stage::Data => "the data",
-            Stage::Tried => "tried at many places",
-            Stage::Forward => "refined beside the causes chosen before",
-            Stage::Backward => "held against what was chosen after it",
-            Stage::Exchange => "tried in the place of another cause",
-            Stage::Settled => "at the end of the search",
-            Stage::Understood => "beside what has no name",
-            Stage::Rival => "against its rivals",
-            Stage::Verdict => "the verdict",
-        }
+        self.row()
     }
 }
 
