@@ -7,7 +7,7 @@
 //! 2. `prepare`, `noise`: white noise and wander, found with everything explainable taken out; data and columns made
 //!    white.
 //! 3. `candidate`: causes as laws, re-simulated; deviations without a name beside them.
-//! 4. `select`: forward, backward, exchange; evidence, size, sessions left out.
+//! 4. `select`: forward, backward; evidence, size, sessions left out.
 //! 5. `rivals`: every rival refitted; look-alikes.
 //! 6. `remainder`: lines and steps left; abstention.
 //! 7. `verdict`: which causes may be named, with parameters, uncertainty, and the gain on sessions left out (`report`).

@@ -27,8 +27,6 @@ table! {
         Forward = "refined beside the causes chosen before",
         /// A law that was chosen has to earn its place again beside a later one.
         Backward = "held against what was chosen after it",
-        /// A law is tried in the place of one that was chosen.
-        Exchange = "tried in the place of another cause",
         /// How a law that was chosen stands when the search is over.
         Settled = "at the end of the search",
         /// What has no name beside a cause must not be too large.
@@ -82,10 +80,6 @@ table! {
         Alone = "is larger than what the laws of the other causes may be wrong by (arcsec rms)",
         /// It predicts sessions that it was not fitted to.
         LeftOut = "predicts sessions that it was not fitted to (gain)",
-        /// In the place of another it gains evidence over that.
-        Ahead = "tells the data better than the cause in whose place it is tried (evidence)",
-        /// It explains the same as what it takes the place of: they differ by less than this share of that.
-        SamePlace = "tells the same as the cause in whose place it is tried (difference as a share of that)",
         /// A line of the generator's angle does not grow with the speed.
         NoGrowthWithSpeed = "does not grow with the speed (growth of its amplitude, standard deviations; negative \
             where it fades)",
@@ -275,7 +269,7 @@ impl Trace {
     /// came farthest. None if all gates let it through to the end.
     #[must_use]
     pub fn stopped(&self, cause: CauseName) -> Option<&Decision> {
-        let search = |step: &&Decision| !matches!(step.stage, Stage::Exchange | Stage::Rival);
+        let search = |step: &&Decision| step.stage != Stage::Rival;
         let last = self.of(cause).rev().find(search)?;
         if last.passed() {
             return None;
