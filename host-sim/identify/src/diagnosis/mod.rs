@@ -29,7 +29,6 @@ pub(crate) mod noise;
 pub mod pipeline;
 pub(crate) mod prepare;
 mod products;
-mod quieted;
 pub(crate) mod remainder;
 pub mod report;
 mod resolution;
