@@ -1,6 +1,6 @@
 //! Which causes: forward by evidence, each held against all others and against deviations without a name; then
-//! backward. A cause has to earn its place four times: evidence, size, size against the misfit of the
-//! other laws, sessions it was not fitted to.
+//! backward. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws,
+//! sessions it was not fitted to.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,7 +14,8 @@ use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
 use crate::linear::Solution;
 
-/// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are dropped again.
+/// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are dropped
+/// again.
 const MOST_ROUNDS: usize = 10;
 /// Number of the best candidates that are refitted jointly, … *Guess*: it bounds the time.
 const CONTENDERS: usize = 3;
