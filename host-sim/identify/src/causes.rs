@@ -19,53 +19,40 @@ pub use parameter::{Factor, Kind, ParameterName, ParameterSpec, TIME, Usual, num
 use spec::CauseSpec;
 pub(crate) use spec::OF_THE_OUTPUT_ENCODER;
 
-macro_rules! causes {
-    ($($cause:ident = $spec:expr,)*) => {
-        /// A physical cause of the library.
-        #[allow(missing_docs, reason = "the properties of each say what it is")]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub enum CauseName {
-            $($cause,)*
-        }
-
-        impl CauseName {
-            /// Every cause.
-            pub const ALL: &[CauseName] = &[$(CauseName::$cause,)*];
-        }
-
-        static SPECS: [CauseSpec; CauseName::ALL.len()] = [$($spec,)*];
-    };
-}
-
-causes! {
-    CircularSplineEccentricity = geometry::CIRCULAR_SPLINE_ECCENTRICITY,
-    FlexsplineRunout = geometry::FLEXSPLINE_RUNOUT,
-    CircularSplineOvality = geometry::CIRCULAR_SPLINE_OVALITY,
-    FlexsplinePitchError = geometry::FLEXSPLINE_PITCH_ERROR,
-    CircularSplinePitchError = geometry::CIRCULAR_SPLINE_PITCH_ERROR,
-    GeneratorEccentricity = lobes::GENERATOR_ECCENTRICITY,
-    CamFormError = geometry::CAM_FORM_ERROR,
-    DamagedTooth = geometry::DAMAGED_TOOTH,
-    CrackedToothRoot = stiffness::CRACKED_TOOTH_ROOT,
-    BacklashGrowth = stiffness::BACKLASH_GROWTH,
-    Wear = stiffness::WEAR,
-    StiffnessHardening = stiffness::STIFFNESS_HARDENING,
-    StiffnessError = stiffness::STIFFNESS_ERROR,
-    TorsionalHysteresis = stiffness::TORSIONAL_HYSTERESIS,
-    ThermalClearance = thermal::THERMAL_CLEARANCE,
-    ThermalStiffness = thermal::THERMAL_STIFFNESS,
-    LubricantViscosity = thermal::LUBRICANT_VISCOSITY,
-    GravityTorque = dynamic::GRAVITY_TORQUE,
-    GravitySideLoad = geometry::GRAVITY_SIDE_LOAD,
-    TorsionalResonance = dynamic::TORSIONAL_RESONANCE,
-    OutputEncoderEccentricity = sensor::OUTPUT_ENCODER_ECCENTRICITY,
-    GeneratorEncoderEccentricity = sensor::GENERATOR_ENCODER_ECCENTRICITY,
-    OutputEncoderTilt = sensor::OUTPUT_ENCODER_TILT,
-    GeneratorEncoderTilt = sensor::GENERATOR_ENCODER_TILT,
-    EncoderSubdivision = sensor::ENCODER_SUBDIVISION,
-    SensorLatency = sensor::SENSOR_LATENCY,
-    RatioError = sensor::RATIO_ERROR,
-    Ratcheting = stiffness::RATCHETING,
+table! {
+    /// A physical cause of the library.
+    #[allow(missing_docs, reason = "the properties of each say what it is")]
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub enum CauseName: &'static CauseSpec {
+        CircularSplineEccentricity = &geometry::CIRCULAR_SPLINE_ECCENTRICITY,
+        FlexsplineRunout = &geometry::FLEXSPLINE_RUNOUT,
+        CircularSplineOvality = &geometry::CIRCULAR_SPLINE_OVALITY,
+        FlexsplinePitchError = &geometry::FLEXSPLINE_PITCH_ERROR,
+        CircularSplinePitchError = &geometry::CIRCULAR_SPLINE_PITCH_ERROR,
+        GeneratorEccentricity = &lobes::GENERATOR_ECCENTRICITY,
+        CamFormError = &geometry::CAM_FORM_ERROR,
+        DamagedTooth = &geometry::DAMAGED_TOOTH,
+        CrackedToothRoot = &stiffness::CRACKED_TOOTH_ROOT,
+        BacklashGrowth = &stiffness::BACKLASH_GROWTH,
+        Wear = &stiffness::WEAR,
+        StiffnessHardening = &stiffness::STIFFNESS_HARDENING,
+        StiffnessError = &stiffness::STIFFNESS_ERROR,
+        TorsionalHysteresis = &stiffness::TORSIONAL_HYSTERESIS,
+        ThermalClearance = &thermal::THERMAL_CLEARANCE,
+        ThermalStiffness = &thermal::THERMAL_STIFFNESS,
+        LubricantViscosity = &thermal::LUBRICANT_VISCOSITY,
+        GravityTorque = &dynamic::GRAVITY_TORQUE,
+        GravitySideLoad = &geometry::GRAVITY_SIDE_LOAD,
+        TorsionalResonance = &dynamic::TORSIONAL_RESONANCE,
+        OutputEncoderEccentricity = &sensor::OUTPUT_ENCODER_ECCENTRICITY,
+        GeneratorEncoderEccentricity = &sensor::GENERATOR_ENCODER_ECCENTRICITY,
+        OutputEncoderTilt = &sensor::OUTPUT_ENCODER_TILT,
+        GeneratorEncoderTilt = &sensor::GENERATOR_ENCODER_TILT,
+        EncoderSubdivision = &sensor::ENCODER_SUBDIVISION,
+        SensorLatency = &sensor::SENSOR_LATENCY,
+        RatioError = &sensor::RATIO_ERROR,
+        Ratcheting = &stiffness::RATCHETING,
+    }
 }
 
 /// Laws whose misfit may be taken for each other: most of all within a kin.
@@ -106,88 +93,66 @@ impl Kin {
     }
 }
 
-/// A condition that data have to meet before they say anything of a cause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-pub enum Need {
-    /// The numbers of teeth.
-    #[serde(rename = "needs_teeth")]
-    Teeth,
-    /// Enough generator turns that a place comes again.
-    #[serde(rename = "needs_turns")]
-    Turns,
-    /// A load on the output, and its column.
-    #[serde(rename = "needs_torque")]
-    Load,
-    /// A spring in the nominal model.
-    #[serde(rename = "needs_stiffness")]
-    Spring,
-    /// The temperature.
-    #[serde(rename = "needs_temperature")]
-    Temperature,
-    /// Temperatures apart from each other, or from the nominal one.
-    #[serde(rename = "needs_temperatures")]
-    TemperatureSpan,
-    /// The time.
-    #[serde(rename = "needs_time")]
-    Time,
-    /// A generator that moves.
-    #[serde(rename = "needs_motion")]
-    Motion,
-    /// A speed or a load that changes fast enough to make a load swing, in rows that are read at one instant.
-    #[serde(rename = "needs_changes")]
-    Swings,
-    /// An output that turns through half a turn.
-    #[serde(rename = "needs_half_output_turn")]
-    HalfOutputTurn,
-    /// So much use that a drive may have worn meanwhile.
-    #[serde(rename = "needs_use")]
-    Use,
-    /// A lasting jump of the error by whole teeth.
-    #[serde(rename = "needs_jump")]
-    Jump,
+table! {
+    /// A condition that data have to meet before they say anything of a cause.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+    pub enum Need: (&'static str, Option<&'static str>) {
+        /// The numbers of teeth.
+        #[serde(rename = "needs_teeth")]
+        Teeth = ("the model gives a ratio and no numbers of teeth",
+            Some("give the numbers of teeth in the nominal model")),
+        /// Enough generator turns that a place comes again.
+        #[serde(rename = "needs_turns")]
+        Turns = ("the generator makes too few turns for one place to come again",
+            Some("record a dozen generator turns or more in one piece")),
+        /// A load on the output, and its column.
+        #[serde(rename = "needs_torque")]
+        Load = ("no load was recorded", Some("load the output, and record the torque (torque_n_m)")),
+        /// A spring in the nominal model.
+        #[serde(rename = "needs_stiffness")]
+        Spring = ("the nominal model does not wind up", Some("give the stiffness in the nominal model")),
+        /// The temperature.
+        #[serde(rename = "needs_temperature")]
+        Temperature = ("no temperature was recorded", Some("record the temperature (temperature_c), cold and warm")),
+        /// Temperatures apart from each other, or from the nominal one.
+        #[serde(rename = "needs_temperatures")]
+        TemperatureSpan = ("the temperature stays close to the nominal one",
+            Some("record sessions at temperatures that differ by 20 K or more")),
+        /// The time.
+        #[serde(rename = "needs_time")]
+        Time = ("no time was recorded", Some("record the time of each row (time_s)")),
+        /// A generator that moves.
+        #[serde(rename = "needs_motion")]
+        Motion = ("the generator does not move", Some("record the drive in motion, at several speeds")),
+        /// A speed or a load that changes fast enough to make a load swing, in rows that are read at one instant.
+        #[serde(rename = "needs_changes")]
+        Swings = ("speed and load stay as they are, or rows are means over some time: no load is seen to swing",
+            Some("record steps of the load, stops and starts, and several speeds, each row read at one instant")),
+        /// An output that turns through half a turn.
+        #[serde(rename = "needs_half_output_turn")]
+        HalfOutputTurn = ("the output turns through less than half a turn",
+            Some("turn the output through a whole turn")),
+        /// So much use that a drive may have worn meanwhile.
+        #[serde(rename = "needs_use")]
+        Use = ("the drive is used too little for wear in between",
+            Some("record again after hours of use, with the same zero")),
+        /// A lasting jump of the error by whole teeth.
+        #[serde(rename = "needs_jump")]
+        Jump = ("the error has no lasting jump by whole teeth", None),
+    }
 }
 
 impl Need {
     /// Why the cause cannot be judged without it.
     #[must_use]
     pub const fn missing(self) -> &'static str {
-        match self {
-            Need::Teeth => "the model gives a ratio and no numbers of teeth",
-            Need::Turns => "the generator makes too few turns for one place to come again",
-            Need::Load => "no load was recorded",
-            Need::Spring => "the nominal model does not wind up",
-            Need::Temperature => "no temperature was recorded",
-            Need::TemperatureSpan => "the temperature stays close to the nominal one",
-            Need::Time => "no time was recorded",
-            Need::Motion => "the generator does not move",
-            Need::Swings => {
-                "speed and load stay as they are, or rows are means over some time: no load is seen to swing"
-            }
-            Need::HalfOutputTurn => "the output turns through less than half a turn",
-            Need::Use => "the drive is used too little for wear in between",
-            Need::Jump => "the error has no lasting jump by whole teeth",
-        }
+        self.row().0
     }
 
     /// The recording, or the number, that would meet it; none where no recording does at will.
     #[must_use]
     pub(crate) const fn remedy(self) -> Option<&'static str> {
-        match self {
-            Need::Teeth => Some("give the numbers of teeth in the nominal model"),
-            Need::Turns => Some("record a dozen generator turns or more in one piece"),
-            Need::Load => Some("load the output, and record the torque (torque_n_m)"),
-            Need::Spring => Some("give the stiffness in the nominal model"),
-            Need::Temperature => Some("record the temperature (temperature_c), cold and warm"),
-            Need::TemperatureSpan => Some("record sessions at temperatures that differ by 20 K or more"),
-            Need::Time => Some("record the time of each row (time_s)"),
-            Need::Motion => Some("record the drive in motion, at several speeds"),
-            Need::Swings => {
-                Some("record steps of the load, stops and starts, and several speeds, each row read at one instant")
-            }
-            Need::HalfOutputTurn => Some("turn the output through a whole turn"),
-            Need::Use => Some("record again after hours of use, with the same zero"),
-            Need::Jump => None,
-        }
+        self.row().1
     }
 }
 
@@ -238,7 +203,7 @@ impl CauseName {
     /// Its entry in the table of causes.
     #[must_use]
     pub(crate) fn spec(self) -> &'static CauseSpec {
-        &SPECS[self as usize]
+        self.row()
     }
 
     /// Its name in files, snake case.
@@ -277,7 +242,7 @@ mod tests {
     #[test]
     fn a_name_reads_back_and_a_misspelt_one_gets_a_suggestion() {
         for cause in CauseName::ALL {
-            assert_eq!(cause.as_str().parse(), Ok(*cause));
+            assert_eq!(cause.as_str().parse(), Ok(cause));
             assert_eq!(serde_json::to_value(cause).unwrap(), cause.as_str());
         }
         let error = "circular_spline_ecentricity".parse::<CauseName>().unwrap_err().to_string();

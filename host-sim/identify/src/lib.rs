@@ -6,6 +6,34 @@
 //! torque from two encoders, [`nominal`] is a drive known from a catalogue alone.
 #![forbid(unsafe_code)]
 
+/// An enum whose variants each have a row of properties, which its method `row` gives; `ALL` has each in its order.
+/// Behind a semicolon a variant may stand that holds another enum, of which a method gives the row; it is not in `ALL`.
+macro_rules! table {
+    ($(#[$meta:meta])* $vis:vis enum $Name:ident: $Row:ty {
+        $($(#[$doc:meta])* $variant:ident = $row:expr,)*
+        $(; $(#[$other_doc:meta])* $other:ident($Inner:ty) = $method:ident)?
+    }) => {
+        $(#[$meta])*
+        $vis enum $Name {
+            $($(#[$doc])* $variant,)*
+            $($(#[$other_doc])* $other($Inner),)?
+        }
+
+        impl $Name {
+            /// Each of them.
+            #[allow(dead_code, reason = "not every table is gone through")]
+            $vis const ALL: [$Name; [$($Name::$variant),*].len()] = [$($Name::$variant),*];
+
+            const fn row(self) -> $Row {
+                match self {
+                    $($Name::$variant => $row,)*
+                    $($Name::$other(of) => of.$method(),)?
+                }
+            }
+        }
+    };
+}
+
 pub mod calibrate;
 pub mod causes;
 pub mod diagnosis;

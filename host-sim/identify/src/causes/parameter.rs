@@ -5,87 +5,74 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-macro_rules! names {
-    ($($name:ident = $text:literal,)*) => {
-        /// The name of a parameter; the unit is its end.
-        #[allow(missing_docs, reason = "the names say it")]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub enum ParameterName {
-            $($name,)*
-        }
-
-        impl ParameterName {
-            /// As it stands in files.
-            #[must_use]
-            pub const fn as_str(self) -> &'static str {
-                match self {
-                    $(ParameterName::$name => $text,)*
-                }
-            }
-        }
-    };
-}
-
-names! {
-    AmplitudeArcsec = "amplitude_arcsec",
-    AmplitudeUm = "amplitude_um",
-    AngleRad = "angle_rad",
-    ArcsecPerHour = "arcsec_per_hour",
-    BendPerK = "bend_per_k",
-    Channel = "channel",
-    ClearanceArcsecPerK = "clearance_arcsec_per_k",
-    DampingRatio = "damping_ratio",
-    DeeperArcsec = "deeper_arcsec",
-    DelayS = "delay_s",
-    DepthUm = "depth_um",
-    DragBendPerK = "drag_bend_per_k",
-    DragNM = "drag_n_m",
-    DurationS = "duration_s",
-    Encoder = "encoder",
-    Events = "events",
-    EveryRows = "every_rows",
-    Exponent = "exponent",
-    FrequencyHz = "frequency_hz",
-    FullLoadNM = "full_load_n_m",
-    Gain = "gain",
-    GeneratorAmplitudeArcsec = "generator_amplitude_arcsec",
-    GrowthArcsec = "growth_arcsec",
-    HalfLashArcsec = "half_lash_arcsec",
-    HalfLoadNM = "half_load_n_m",
-    HalfWidthArcsec = "half_width_arcsec",
-    HardeningArcsec = "hardening_arcsec",
-    HardeningExponent = "hardening_exponent",
-    Harmonic = "harmonic",
-    JitterMs = "jitter_ms",
-    JumpArcsec = "jump_arcsec",
-    LagS = "lag_s",
-    PerK = "per_k",
-    PhaseRad = "phase_rad",
-    PressedArcsec = "pressed_arcsec",
-    RatioRelativeError = "ratio_relative_error",
-    RelativeDragPerK = "relative_drag_per_k",
-    Share = "share",
-    SizeArcsec = "size_arcsec",
-    SizeUm = "size_um",
-    SlipTorqueNM = "slip_torque_n_m",
-    SpeedExponent = "speed_exponent",
-    StepArcsec = "step_arcsec",
-    StepS = "step_s",
-    StiffnessRatio = "stiffness_ratio",
-    StiffnessRelativePerK = "stiffness_relative_per_k",
-    TimeS = "time_s",
-    Tooth = "tooth",
-    TorqueNM = "torque_n_m",
-    Turns = "turns",
-    Wheel = "wheel",
-    WidthRad = "width_rad",
+table! {
+    /// The name of a parameter; the unit is its end.
+    #[allow(missing_docs, reason = "the names say it")]
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub enum ParameterName: (&'static str, Kind) {
+        AmplitudeArcsec = ("amplitude_arcsec", Kind::Size),
+        AmplitudeUm = ("amplitude_um", Kind::Other),
+        AngleRad = ("angle_rad", Kind::Angle),
+        ArcsecPerHour = ("arcsec_per_hour", Kind::Other),
+        BendPerK = ("bend_per_k", Kind::Other),
+        Channel = ("channel", Kind::Count),
+        ClearanceArcsecPerK = ("clearance_arcsec_per_k", Kind::Size),
+        DampingRatio = ("damping_ratio", Kind::Other),
+        DeeperArcsec = ("deeper_arcsec", Kind::Size),
+        DelayS = ("delay_s", Kind::Size),
+        DepthUm = ("depth_um", Kind::Other),
+        DragBendPerK = ("drag_bend_per_k", Kind::Other),
+        DragNM = ("drag_n_m", Kind::Size),
+        DurationS = ("duration_s", Kind::Other),
+        Encoder = ("encoder", Kind::Count),
+        Events = ("events", Kind::Count),
+        EveryRows = ("every_rows", Kind::Count),
+        Exponent = ("exponent", Kind::Other),
+        FrequencyHz = ("frequency_hz", Kind::Other),
+        FullLoadNM = ("full_load_n_m", Kind::Other),
+        Gain = ("gain", Kind::Other),
+        GeneratorAmplitudeArcsec = ("generator_amplitude_arcsec", Kind::Other),
+        GrowthArcsec = ("growth_arcsec", Kind::Size),
+        HalfLashArcsec = ("half_lash_arcsec", Kind::Other),
+        HalfLoadNM = ("half_load_n_m", Kind::Other),
+        HalfWidthArcsec = ("half_width_arcsec", Kind::Size),
+        HardeningArcsec = ("hardening_arcsec", Kind::Size),
+        HardeningExponent = ("hardening_exponent", Kind::Other),
+        Harmonic = ("harmonic", Kind::Count),
+        JitterMs = ("jitter_ms", Kind::Other),
+        JumpArcsec = ("jump_arcsec", Kind::Size),
+        LagS = ("lag_s", Kind::Other),
+        PerK = ("per_k", Kind::Other),
+        PhaseRad = ("phase_rad", Kind::Angle),
+        PressedArcsec = ("pressed_arcsec", Kind::Other),
+        RatioRelativeError = ("ratio_relative_error", Kind::Size),
+        RelativeDragPerK = ("relative_drag_per_k", Kind::Other),
+        Share = ("share", Kind::Other),
+        SizeArcsec = ("size_arcsec", Kind::Other),
+        SizeUm = ("size_um", Kind::Other),
+        SlipTorqueNM = ("slip_torque_n_m", Kind::Other),
+        SpeedExponent = ("speed_exponent", Kind::Other),
+        StepArcsec = ("step_arcsec", Kind::Other),
+        StepS = ("step_s", Kind::Other),
+        StiffnessRatio = ("stiffness_ratio", Kind::Size),
+        StiffnessRelativePerK = ("stiffness_relative_per_k", Kind::Size),
+        TimeS = ("time_s", Kind::Other),
+        Tooth = ("tooth", Kind::Count),
+        TorqueNM = ("torque_n_m", Kind::Size),
+        Turns = ("turns", Kind::Count),
+        Wheel = ("wheel", Kind::Count),
+        WidthRad = ("width_rad", Kind::Other),
+    }
 }
 
 /// Kinds of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A size: how wrong a law is, is a share of it.
+    /// A size by which causes are judged: how wrong a law is, is a share of it.
     Size,
+    /// A shape, or a size in other units. So is the gain of a resonance: it trades with the damping, while what it adds
+    /// is known.
+    Other,
     /// The direction of a wave or a place on a wheel, which half a turn brings back: how wrong a law is, is an angle.
     Angle,
     /// A count or a choice: no law is a little wrong about it.
@@ -93,21 +80,16 @@ pub enum Kind {
 }
 
 impl ParameterName {
+    /// As it stands in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        self.row().0
+    }
+
     /// Its kind.
     #[must_use]
     pub const fn kind(self) -> Kind {
-        match self {
-            ParameterName::PhaseRad | ParameterName::AngleRad => Kind::Angle,
-            ParameterName::Harmonic
-            | ParameterName::Tooth
-            | ParameterName::Wheel
-            | ParameterName::Events
-            | ParameterName::EveryRows
-            | ParameterName::Turns
-            | ParameterName::Encoder
-            | ParameterName::Channel => Kind::Count,
-            _ => Kind::Size,
-        }
+        self.row().1
     }
 }
 

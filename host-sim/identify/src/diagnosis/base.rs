@@ -20,33 +20,27 @@ use crate::nominal::Nominal;
 use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// How the flank changes where the torque is below friction.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum PlayLaw {
-    /// It stays as it was until the torque exceeds friction.
-    Held,
-    /// Friction holds the output until the generator pushes it.
-    Pushed,
-    /// It follows the sign of the torque.
-    Sign,
-    /// `tanh(torque / friction)`.
-    Smooth,
+table! {
+    /// How the flank changes where the torque is below friction; with its name in a file.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub(crate) enum PlayLaw: &'static str {
+        /// It stays as it was until the torque exceeds friction.
+        Held = "held",
+        /// Friction holds the output until the generator pushes it.
+        Pushed = "pushed",
+        /// It follows the sign of the torque.
+        Sign = "sign",
+        /// `tanh(torque / friction)`.
+        Smooth = "smooth",
+    }
 }
 
 impl PlayLaw {
-    /// All laws.
-    pub(crate) const ALL: [PlayLaw; 4] = [PlayLaw::Held, PlayLaw::Pushed, PlayLaw::Sign, PlayLaw::Smooth];
-
     /// Its name in a file.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
-        match self {
-            PlayLaw::Held => "held",
-            PlayLaw::Pushed => "pushed",
-            PlayLaw::Sign => "sign",
-            PlayLaw::Smooth => "smooth",
-        }
+        self.row()
     }
 
     /// Which flank carries in each row, −1 to 1, under a torque.

@@ -292,12 +292,6 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     Some(what)
 }
 
-/// Wind-up for 1 N·m, arcsec, on the way to a load.
-pub(super) fn slope_arcsec(nominal: &Nominal, load_n_m: f64) -> f64 {
-    let load = load_n_m.max(1e-3);
-    nominal.wind_up_arcsec(load) / load
-}
-
 /// Multiplies the torque.
 fn scale(recording: &mut Recording, factor: f64) {
     recording

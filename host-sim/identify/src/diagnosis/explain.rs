@@ -166,7 +166,7 @@ fn not_named(stopped: Option<&Decision>, alike: &[CauseName]) -> String {
     }
     let mut text = format!("It is not named: {}", step.stage.words());
     match step.against {
-        Some(against) if matches!(step.stage, Stage::Exchange | Stage::Rival) => text += &format!(" ({against})"),
+        Some(against) if step.stage == Stage::Rival => text += &format!(" ({against})"),
         _ => {}
     }
     let _ = write!(text, ", it did not hold that it {}", judged.gate.asks());

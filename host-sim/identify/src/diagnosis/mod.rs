@@ -7,7 +7,7 @@
 //! 2. `prepare`, `noise`: white noise and wander, found with everything explainable taken out; data and columns made
 //!    white.
 //! 3. `candidate`: causes as laws, re-simulated; deviations without a name beside them.
-//! 4. `select`: forward, backward, exchange; evidence, size, sessions left out.
+//! 4. `select`: forward, backward; evidence, size, sessions left out.
 //! 5. `rivals`: every rival refitted; look-alikes.
 //! 6. `remainder`: lines and steps left; abstention.
 //! 7. `verdict`: which causes may be named, with parameters, uncertainty, and the gain on sessions left out (`report`).
@@ -29,7 +29,6 @@ pub(crate) mod noise;
 pub mod pipeline;
 pub(crate) mod prepare;
 mod products;
-mod quieted;
 pub(crate) mod remainder;
 pub mod report;
 mod resolution;
@@ -226,8 +225,8 @@ impl<'a> Search<'a> {
         laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.contains(&cause)));
         let mut trace = Trace::new(settings.verbose);
         for cause in CauseName::ALL {
-            if let Some(need) = on.lacks(*cause) {
-                trace.decided(Stage::Data, (*cause).into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
+            if let Some(need) = on.lacks(cause) {
+                trace.decided(Stage::Data, cause.into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
             }
         }
         // Rows to an average that leave about as many averages as asked for, unless they hide something.

@@ -20,7 +20,7 @@ use thiserror::Error;
 
 use super::report::{Cause, Diagnosis};
 use super::{DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
-use super::{channels, quieted, torque_zero, zeros};
+use super::{channels, torque_zero, zeros};
 use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrate, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
@@ -344,7 +344,6 @@ pub fn parse_rows(
     if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
         recording.unusable = without_torque(&recording);
     }
-    recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
     if recording.unusable.is_none() {
         torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
     }

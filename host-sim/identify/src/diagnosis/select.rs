@@ -1,6 +1,6 @@
 //! Which causes: forward by evidence, each held against all others and against deviations without a name; then
-//! backward, then exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the
-//! other laws, sessions it was not fitted to.
+//! backward. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws,
+//! sessions it was not fitted to.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,7 +14,8 @@ use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
 use crate::linear::Solution;
 
-/// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are exchanged.
+/// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are dropped
+/// again.
 const MOST_ROUNDS: usize = 10;
 /// Number of the best candidates that are refitted jointly, … *Guess*: it bounds the time.
 const CONTENDERS: usize = 3;
@@ -26,8 +27,6 @@ const REFINED: usize = 9;
 /// Best starting points that are kept each time that a model is tried. *Guess*: the second one for a wheel that has two
 /// sizes.
 const NOTED: usize = 2;
-/// Models that are refined in place of another. *Guess*: it bounds the time.
-const EXCHANGED: usize = 4;
 /// Models that are refined in each round on all rows, of those that came close on a sample. *Guess*: it bounds the
 /// time.
 const REFINED_AGAIN: usize = 4;
@@ -67,7 +66,8 @@ impl<'l> Selected<'l> {
     /// Prediction beside the nominal one, averaged.
     #[must_use]
     pub fn predicted(&self, problem: &Problem<'_>) -> Vec<f64> {
-        predicted(problem, &self.terms, &self.fit)
+        let columns = problem.base.iter().chain(self.terms.iter().flat_map(|term| term.averaged.iter()));
+        super::rows::combined(problem.data.len(), columns.map(Vec::as_slice), &self.fit.solution.coefficients)
     }
 
     /// The selection without term `k`, the others as they are then, fitted.
@@ -94,21 +94,6 @@ pub(crate) struct Standing {
     pub alone: f64,
     /// Relative change of the prediction error of sessions left out (negative: better without it).
     pub left_out: f64,
-}
-
-/// Columns and shape parameters of a term: how much it can follow.
-fn follows(term: &Term<'_>) -> usize {
-    term.len() + 2 * term.places.len()
-}
-
-/// Whether a term with a name follows much less than another.
-fn simpler(term: &Term<'_>, than: &Term<'_>) -> bool {
-    term.law.named() && 3 * follows(term) <= 2 * follows(than)
-}
-
-/// Whether predictions this far apart are the same, as far as laws are known, for something of this size.
-fn same(apart: f64, size: f64) -> bool {
-    apart < SAME_ARCSEC.min(SAME_SHARE * size)
 }
 
 /// Evidence by which something without a name has to be ahead of a cause, if there is one, where that gains so much: by
@@ -351,18 +336,6 @@ pub(super) fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// Prediction in addition to the nominal one, averaged.
-#[must_use]
-pub fn predicted<'t, 'l: 't>(
-    problem: &Problem<'_>,
-    terms: impl IntoIterator<Item = &'t Term<'l>>,
-    fit: &Fit,
-) -> Vec<f64> {
-    let columns = terms.into_iter().flat_map(|term| term.averaged.iter());
-    let columns = problem.base.iter().chain(columns).map(Vec::as_slice);
-    super::rows::combined(problem.data.len(), columns, &fit.solution.coefficients)
-}
-
 /// Gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
 fn left_out_gain(problem: &Problem<'_>, terms: &[Term<'_>], fewer: &[Term<'_>]) -> f64 {
     // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first
@@ -548,16 +521,9 @@ impl<'l> Chooser<'_, '_, 'l> {
             selected = self.backward(settle_each(problem, selected, false)?)?;
         }
         let mut seen = HashSet::new();
-        for round in 0..MOST_ROUNDS {
+        for _ in 0..MOST_ROUNDS {
             let Some(next) = self.forward(&selected) else { break };
-            let taken = next.terms.len();
             selected = self.backward(settle(problem, next)?)?;
-            if self.scope == Scope::Everything && (round > 0 || selected.terms.len() > 1) {
-                // What was taken just now was held against all others with the same terms, unless one of them has gone
-                // since.
-                let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
-                selected = self.exchange(selected, compared)?;
-            }
             let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
             causes.sort_unstable();
             if !seen.insert(causes.join("+")) {
@@ -680,78 +646,6 @@ impl<'l> Chooser<'_, '_, 'l> {
             selected = settle_each(problem, Selected::of(problem, selected.terms)?, true)?;
         }
         Some(selected)
-    }
-
-    /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what
-    /// no longer earns its place then.
-    fn exchange(&mut self, selected: Selected<'l>, compared: usize) -> Option<Selected<'l>> {
-        let problem = self.problem;
-        for k in (0..selected.terms.len()).filter(|k| *k != compared) {
-            let held = &selected.terms[k];
-            let without = selected.without(problem, k)?;
-            let may = |law: &&'l Law| {
-                selected.terms.iter().all(|t| t.law.label != law.label)
-                    && tolerance(problem, &without.fit, law).is_none_or(|judged| judged.passed)
-            };
-            let open: Vec<&Law> = self.laws.iter().filter(may).collect();
-            let scaffold = Scaffold::new(problem, &without.terms);
-            let tried = tried(&scaffold, &open, |law| self.bests.begin(&scaffold, law));
-            let rivals = best_tried(&scaffold, &open, tried, EXCHANGED).0;
-            let refined = rivals.into_par_iter().with_max_len(1).filter_map(|term| scaffold.refine(term));
-            let refined: Vec<_> = refined.filter(|(term, fit)| sound(term, fit.last())).collect();
-            let now = selected.predicted(problem);
-            let size = size_of(problem, &less(&now, &without.predicted(problem)));
-            let evidence = selected.fit.solution.evidence + held.occam;
-            for of in refined.iter().filter(|of| evidence_of(of) > evidence - CLOSE_BEHIND) {
-                self.bests.came_close(&of.0);
-            }
-            let judge = |of: &(Term<'l>, Fit)| -> Vec<Judged> {
-                let (term, fit) = of;
-                let then = predicted(problem, without.terms.iter().chain([term]), fit);
-                let apart = size_of(problem, &less(&then, &now));
-                let gain = evidence - without.fit.solution.evidence;
-                let unnamed = || unnamed_ahead(Some(held.law).filter(|held| held.named()), gain);
-                let needed = if term.law.named() { AHEAD } else { unnamed() };
-                // What follows more does not take the place of what predicts the same.
-                let no_simpler = !(same(apart, size) && simpler(held, term));
-                let ahead =
-                    evidence_of(of) > evidence + needed && no_simpler || same(apart, size) && simpler(term, held);
-                vec![
-                    Judged {
-                        passed: apart < IN_PLACE * size,
-                        ..Judged::below(Gate::SamePlace, apart / size, IN_PLACE)
-                    },
-                    Judged { passed: ahead, ..Judged::above(Gate::Ahead, evidence_of(of) - evidence, needed) },
-                ]
-            };
-            let mut contenders = Vec::new();
-            for of in refined {
-                let gates = judge(&of);
-                if passed(&gates) {
-                    contenders.push((of, gates));
-                } else {
-                    self.trace.judged(Stage::Exchange, of.0.law, &of.0.places, Some(held.law.label), gates);
-                }
-            }
-            let best = contenders.into_iter().max_by(|a, b| evidence_of(&a.0).total_cmp(&evidence_of(&b.0)));
-            let Some((best, mut gates)) = best else { continue };
-            let ahead_by = evidence_of(&best) - evidence;
-            let (term, fit) = best;
-            let (law, places) = (term.law, term.places.clone());
-            let terms = without.terms.into_iter().chain([term]).collect();
-            let exchanged = settle(problem, Selected { fit, terms })?;
-            // It has to earn the place that it takes.
-            let last = exchanged.terms.len() - 1;
-            gates.extend(earns(problem, &exchanged, &standings(problem, &exchanged), last, self.least));
-            let taken = passed(&gates);
-            self.trace.judged(Stage::Exchange, law, &places, Some(held.law.label), gates);
-            if taken {
-                let gates = vec![Judged { passed: false, ..Judged::above(Gate::First, 0.0, ahead_by) }];
-                self.trace.judged(Stage::Exchange, held.law, &held.places, Some(law.label), gates);
-                return self.backward(exchanged);
-            }
-        }
-        self.backward(selected)
     }
 }
 

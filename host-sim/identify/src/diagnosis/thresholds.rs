@@ -37,12 +37,6 @@ pub(crate) mod selection {
     pub(crate) const LEAST_OF_MISFIT: f64 = 2.0;
     /// Least size of a deviation without a name against what the laws of the other terms may be wrong by. *Chosen*.
     pub(crate) const LEAST_UNNAMED_OF_MISFIT: f64 = 1.5;
-    /// Predictions are the same if they are closer than this, arcsec rms, … *Guess*.
-    pub(crate) const SAME_ARCSEC: f64 = 0.75;
-    /// … and than this share of what they explain. *Guess*.
-    pub(crate) const SAME_SHARE: f64 = 0.04;
-    /// A law takes the place of another only where what it explains differs from it by less than this share. *Chosen*.
-    pub(crate) const IN_PLACE: f64 = 0.7;
     /// Causes at most. *Source*: by definition.
     pub(crate) const MOST_CAUSES: usize = 3;
     /// Unnamed deviations at most. *Guess*.
@@ -54,8 +48,6 @@ pub(crate) mod selection {
     pub(crate) const CLOSE_BEHIND: f64 = 8.0;
     /// Evidence that a law has to gain at all, refined; and a base parameter to be named. *Chosen*.
     pub(crate) const LEAST_GAIN: f64 = 0.5;
-    /// Evidence by which a cause has to be ahead of another to take its place. *Chosen*.
-    pub(crate) const AHEAD: f64 = 3.0;
     /// Evidence by which the second order and the subdivision of the generator's encoder have to be ahead of wheels,
     /// which make the same waves and leave traces of the flank and of other orders besides. *Guess*.
     pub(crate) const AFTER_WHEELS: f64 = 15.0;

@@ -14,45 +14,35 @@ use serde::ser::Serializer;
 use super::candidate::{Label, Law};
 use crate::causes::{CauseName, Need, ParameterName};
 
-/// Where in the search a decision fell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stage {
-    /// Before the search: can these data speak of the cause at all?
-    Data,
-    /// A law is tried at many places, none of them refined.
-    Tried,
-    /// Laws are refined, and compared beside those chosen before.
-    Forward,
-    /// A law that was chosen has to earn its place again beside a later one.
-    Backward,
-    /// A law is tried in the place of one that was chosen.
-    Exchange,
-    /// How a law that was chosen stands when the search is over.
-    Settled,
-    /// What has no name beside a cause must not be too large.
-    Understood,
-    /// Every rival is refitted in the place of a cause.
-    Rival,
-    /// The verdict over all causes together.
-    Verdict,
+table! {
+    /// Where in the search a decision fell.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Stage: &'static str {
+        /// Before the search: can these data speak of the cause at all?
+        Data = "the data",
+        /// A law is tried at many places, none of them refined.
+        Tried = "tried at many places",
+        /// Laws are refined, and compared beside those chosen before.
+        Forward = "refined together with the causes chosen before",
+        /// A law that was chosen has to earn its place again beside a later one.
+        Backward = "held against what was chosen after it",
+        /// How a law that was chosen stands when the search is over.
+        Settled = "at the end of the search",
+        /// What has no name beside a cause must not be too large.
+        Understood = "together with unnamed terms",
+        /// Every rival is refitted in the place of a cause.
+        Rival = "against its rivals",
+        /// The verdict over all causes together.
+        Verdict = "the verdict",
+    }
 }
 
 impl Stage {
     /// Its words for a reader.
     #[must_use]
     pub const fn words(self) -> &'static str {
-        match self {
-            Stage::Data => "the data",
-            Stage::Tried => "tried at many places",
-            Stage::Forward => "refined together with the causes chosen before",
-            Stage::Backward => "held against what was chosen after it",
-            Stage::Exchange => "tried in the place of another cause",
-            Stage::Settled => "at the end of the search",
-            Stage::Understood => "together with unnamed terms",
-            Stage::Rival => "against its rivals",
-            Stage::Verdict => "the verdict",
-        }
+        self.row()
     }
 }
 
@@ -61,97 +51,65 @@ fn name_of(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-/// A gate that a law has to pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Gate {
-    /// A parameter of the nominal model has left its tolerance, in standard deviations between units.
-    Tolerance,
-    /// There is room: this many causes, or deviations, are chosen at most.
-    Room,
-    /// Tried at many places it gains as much evidence as the last law that was refined.
-    Refined,
-    /// Its signs and sizes make sense.
-    Sense,
-    /// Its deviations are no larger than this share of the law itself.
-    Deviations,
-    /// Refined it gains any evidence.
-    Gain,
-    /// No other law gains more.
-    First,
-    /// It gains evidence over the model without it.
-    Evidence,
-    /// It is large enough, arcsec.
-    Size,
-    /// It is large enough for a cause that is clear, arcsec.
-    SizeIfClear,
-    /// What nothing else explains of it is larger than what the laws of the other causes may be wrong by, arcsec.
-    Alone,
-    /// It predicts sessions that it was not fitted to.
-    LeftOut,
-    /// In the place of another it gains evidence over that.
-    Ahead,
-    /// It explains the same as what it takes the place of: they differ by less than this share of that.
-    SamePlace,
-    /// A line of the generator's angle does not grow with the speed.
-    NoGrowthWithSpeed,
-    /// A load that was not recorded may make it: no more is left than this many times the noise.
-    LoadKnown,
-    /// No line in time that has no name, near its frequency, is as large as this against it.
-    NoLineBeside,
-    /// It is this many times its own uncertainty.
-    KnownWell,
-    /// The best known of its sizes is this many times its standard deviation.
-    ToldFromZero,
-    /// Rivals raise the misfit by this much.
-    ToldApart,
-    /// As a rival it would lower the misfit against the cause that was named.
-    AsRival,
-    /// All causes together predict sessions left out no worse than the nominal model, arcsec rms.
-    NoWorse,
-    /// The data hold what it needs.
-    #[serde(untagged)]
-    Needs(Need),
+table! {
+    /// A gate that a law has to pass, and what it asks, as a sentence of which the law is the subject.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Gate: &'static str {
+        /// A parameter of the nominal model has left its tolerance, in standard deviations between units.
+        Tolerance = "takes a parameter of the nominal model out of its tolerance (standard deviations between units)",
+        /// There is room: this many causes, or deviations, are chosen at most.
+        Room = "finds room next to the models chosen already",
+        /// Tried at many places it gains as much evidence as the last law that was refined.
+        Refined = "gains as much evidence, not yet refined, as the laws that are refined",
+        /// Its signs and sizes make sense.
+        Sense = "has signs and sizes that make sense",
+        /// Its deviations are no larger than this share of the law itself.
+        Deviations = "is larger than its own deviations (their share of it)",
+        /// Refined it gains any evidence.
+        Gain = "gains evidence when it is refined",
+        /// No other law gains more.
+        First = "gains more evidence than any other law",
+        /// It gains evidence over the model without it.
+        Evidence = "gains evidence over the model without it (natural logarithm)",
+        /// It is large enough, arcsec.
+        Size = "is large enough (arcsec rms)",
+        /// It is large enough for a cause that is clear, arcsec.
+        SizeIfClear = "is large enough for a cause that is clear (arcsec rms)",
+        /// What nothing else explains of it is larger than what the laws of the other causes may be wrong by, arcsec.
+        Alone = "is larger than what the laws of the other causes may be wrong by (arcsec rms)",
+        /// It predicts sessions that it was not fitted to.
+        LeftOut = "predicts sessions that it was not fitted to (gain)",
+        /// A line of the generator's angle does not grow with the speed.
+        NoGrowthWithSpeed = "does not grow with the speed (growth of its amplitude, standard deviations; negative \
+            where it fades)",
+        /// A load that was not recorded may make it: no more is left than this many times the noise.
+        LoadKnown = "leaves no more than noise, as a load that was not recorded may make it (times the noise)",
+        /// No line in time that has no name, near its frequency, is as large as this against it.
+        NoLineBeside = "does not stand beside a line in time near its frequency that nothing in the drive drives (its \
+            size as a share of the cause)",
+        /// It is this many times its own uncertainty.
+        KnownWell = "is well determined next to unnamed terms (times its own uncertainty)",
+        /// The best known of its sizes is this many times its standard deviation.
+        ToldFromZero = "has a size that differs from zero (times its standard deviation)",
+        /// Rivals raise the misfit by this much.
+        ToldApart = "is distinguishable from a rival (rise of the misfit with the rival in its place)",
+        /// As a rival it would lower the misfit against the cause that was named.
+        AsRival = "tells the data better in the place of a cause that was named (rise of the misfit)",
+        /// All causes together predict sessions left out no worse than the nominal model, arcsec rms.
+        NoWorse = "predicts sessions left out, with the others named (arcsec rms)",
+        ;
+        /// The data hold what it needs.
+        #[serde(untagged)]
+        Needs(Need) = missing
+    }
 }
 
 impl Gate {
     /// What it asks, as a sentence of which the law is the subject.
     #[must_use]
     pub const fn asks(self) -> &'static str {
-        match self {
-            Gate::Needs(need) => need.missing(),
-            Gate::Tolerance => {
-                "takes a parameter of the nominal model out of its tolerance (standard deviations between units)"
-            }
-            Gate::Room => "finds room next to the models chosen already",
-            Gate::Refined => "gains as much evidence, not yet refined, as the laws that are refined",
-            Gate::Sense => "has signs and sizes that make sense",
-            Gate::Deviations => "is larger than its own deviations (their share of it)",
-            Gate::Gain => "gains evidence when it is refined",
-            Gate::First => "gains more evidence than any other law",
-            Gate::Evidence => "gains evidence over the model without it (natural logarithm)",
-            Gate::Size => "is large enough (arcsec rms)",
-            Gate::SizeIfClear => "is large enough for a cause that is clear (arcsec rms)",
-            Gate::Alone => "is larger than what the laws of the other causes may be wrong by (arcsec rms)",
-            Gate::LeftOut => "predicts sessions that it was not fitted to (gain)",
-            Gate::Ahead => "tells the data better than the cause in whose place it is tried (evidence)",
-            Gate::SamePlace => "tells the same as the cause in whose place it is tried (difference as a share of that)",
-            Gate::NoGrowthWithSpeed => {
-                "does not grow with the speed (growth of its amplitude, standard deviations; negative where it fades)"
-            }
-            Gate::LoadKnown => {
-                "leaves no more than noise, as a load that was not recorded may make it (times the noise)"
-            }
-            Gate::NoLineBeside => {
-                "does not stand beside a line in time near its frequency that nothing in the drive drives (its size as \
-                 a share of the cause)"
-            }
-            Gate::KnownWell => "is well determined next to unnamed terms (times its own uncertainty)",
-            Gate::ToldFromZero => "has a size that differs from zero (times its standard deviation)",
-            Gate::ToldApart => "is distinguishable from a rival (rise of the misfit with the rival in its place)",
-            Gate::AsRival => "tells the data better in the place of a cause that was named (rise of the misfit)",
-            Gate::NoWorse => "predicts sessions left out, with the others named (arcsec rms)",
-        }
+        self.row()
     }
 }
 
@@ -311,7 +269,7 @@ impl Trace {
     /// came farthest. None if all gates let it through to the end.
     #[must_use]
     pub fn stopped(&self, cause: CauseName) -> Option<&Decision> {
-        let search = |step: &&Decision| !matches!(step.stage, Stage::Exchange | Stage::Rival);
+        let search = |step: &&Decision| step.stage != Stage::Rival;
         let last = self.of(cause).rev().find(search)?;
         if last.passed() {
             return None;

@@ -65,23 +65,6 @@ pub struct Known {
     pub told_from_zero: f64,
 }
 
-/// Sizes by which causes are judged; what else they have are places, shapes and the same in other units. The gain of a
-/// resonance is none: it trades with the damping, while what it adds is known.
-const SIZES: [ParameterName; 13] = [
-    ParameterName::AmplitudeArcsec,
-    ParameterName::ClearanceArcsecPerK,
-    ParameterName::DeeperArcsec,
-    ParameterName::DelayS,
-    ParameterName::DragNM,
-    ParameterName::GrowthArcsec,
-    ParameterName::HalfWidthArcsec,
-    ParameterName::HardeningArcsec,
-    ParameterName::JumpArcsec,
-    ParameterName::RatioRelativeError,
-    ParameterName::StiffnessRatio,
-    ParameterName::StiffnessRelativePerK,
-    ParameterName::TorqueNM,
-];
 /// A size that is known exactly counts as this many times its standard deviation. *Guess*: beyond all limits for
 /// standard deviations.
 const EXACTLY: f64 = 1e3;
@@ -263,12 +246,12 @@ fn parameters(
         let scale = match name.kind() {
             Kind::Angle => 1.0,
             Kind::Count => 0.0,
-            Kind::Size => value.abs(),
+            Kind::Size | Kind::Other => value.abs(),
         };
         let with_doubt = |variance: f64| variance.sqrt().hypot(term.law.wrong.doubt * scale);
         let form = outer(slope);
         parameters.insert(name.as_str(), Parameter { value, std: with_doubt(spread.of(&form)) });
-        if SIZES.contains(&name) {
+        if name.kind() == Kind::Size {
             let without = if name == ParameterName::StiffnessRatio { 1.0 } else { 0.0 };
             let times = (value - without).abs() / with_doubt(spread.beyond_noise(&form, beyond)).max(1e-30);
             told = Some(told.map_or(times, |told| told.max(times)));

@@ -30,50 +30,38 @@ use relation::torque_says;
 use turns::{proposed_ratio, units_of_counts};
 use words::NameMeaning;
 
-/// The contents of a column, as far as they can be decided.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Role {
-    /// Time.
-    Time,
-    /// Generator angle.
-    Generator,
-    /// Output angle.
-    Output,
-    /// Output angle less generator over ratio.
-    Error,
-    /// Load torque.
-    Torque,
-    /// A motor current, which may stand for the torque.
-    Current,
-    /// Temperature.
-    Temperature,
-    /// Angle against gravity.
-    Orientation,
-    /// A speed: not needed.
-    Speed,
-    /// A value that was commanded, not measured.
-    Command,
-    /// Not known.
-    #[default]
-    Unknown,
+table! {
+    /// The contents of a column, as far as they can be decided, and their place in a mapping, if they have one.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Role: Option<Quantity> {
+        /// Time.
+        Time = Some(Quantity::Time),
+        /// Generator angle.
+        Generator = Some(Quantity::Generator),
+        /// Output angle.
+        Output = Some(Quantity::Output),
+        /// Output angle less generator over ratio.
+        Error = Some(Quantity::Error),
+        /// Load torque.
+        Torque = Some(Quantity::Torque),
+        /// A motor current, which may stand for the torque.
+        Current = Some(Quantity::Torque),
+        /// Temperature.
+        Temperature = Some(Quantity::Temperature),
+        /// Angle against gravity.
+        Orientation = Some(Quantity::Orientation),
+        /// A speed: not needed.
+        Speed = None,
+        /// A value that was commanded, not measured.
+        Command = None,
+        /// Not known.
+        #[default]
+        Unknown = None,
+    }
 }
 
 impl Role {
-    /// Its place in a mapping, if it has one.
-    fn in_mapping(self) -> Option<Quantity> {
-        match self {
-            Role::Time => Some(Quantity::Time),
-            Role::Generator => Some(Quantity::Generator),
-            Role::Output => Some(Quantity::Output),
-            Role::Error => Some(Quantity::Error),
-            Role::Torque | Role::Current => Some(Quantity::Torque),
-            Role::Temperature => Some(Quantity::Temperature),
-            Role::Orientation => Some(Quantity::Orientation),
-            Role::Speed | Role::Command | Role::Unknown => None,
-        }
-    }
-
     fn is_angle(self) -> bool {
         matches!(self, Role::Generator | Role::Output | Role::Orientation)
     }
@@ -229,7 +217,7 @@ impl Guess {
 
     /// The column of the reader by the mapping, if it is in use.
     fn mapped(&self, place: usize) -> Option<MappedColumn> {
-        let quantity = self.column.role.in_mapping().filter(|_| self.column.used)?;
+        let quantity = self.column.role.row().filter(|_| self.column.used)?;
         let reading = Reading::parse(&self.written()?, quantity.family(), None).ok()?;
         let name = self.name.clone();
         Some(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said: false })
@@ -244,7 +232,7 @@ impl Guess {
     /// Its entry in a mapping, with a word in place of a unit that is open.
     fn entry(&self) -> String {
         let open = if self.unit.is_some() { "count/COUNTS" } else { "UNIT" };
-        let quantity = self.column.role.in_mapping().map_or("", Quantity::name);
+        let quantity = self.column.role.row().map_or("", Quantity::name);
         format!("{quantity}={}:{}", self.name, self.written().as_deref().unwrap_or(open))
     }
 }
@@ -415,7 +403,7 @@ fn fits(role: Role, unit: Unit) -> bool {
     match role {
         Role::Current => matches!(unit, Unit::Ampere | Unit::Milliampere),
         Role::Speed => false,
-        _ => role.in_mapping().is_none_or(|quantity| quantity.family() == unit.family()),
+        _ => role.row().is_none_or(|quantity| quantity.family() == unit.family()),
     }
 }
 
@@ -579,7 +567,7 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
 /// Asks for the units of columns in use that are written and not known.
 fn ask_for_units(guesses: &mut [Guess], notes: &mut Vec<String>) {
     for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.column.used) {
-        let Some((unit, quantity)) = guess.unknown_unit.take().zip(guess.column.role.in_mapping()) else { continue };
+        let Some((unit, quantity)) = guess.unknown_unit.take().zip(guess.column.role.row()) else { continue };
         let refusal = quantity.refusal(WrongReading::Unit(unit));
         (guess.unit, guess.column.counts_per_turn, guess.column.confidence) = (None, None, 0.0);
         notes.push(format!("column {}, {quantity}: {refusal}", place + 1));

@@ -10,70 +10,44 @@ pub use super::unit::{Reading, Unit};
 use flexspline_base::csv_rows::TableProblem;
 use flexspline_base::suggest::{did_you_mean, likeliest, question};
 
-/// The quantities of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Quantity {
-    /// Time.
-    Time,
-    /// Generator angle.
-    Generator,
-    /// Output angle.
-    Output,
-    /// Output angle less generator over ratio.
-    Error,
-    /// Load torque at the output.
-    Torque,
-    /// Temperature.
-    Temperature,
-    /// Angle of the drive against gravity.
-    Orientation,
+table! {
+    /// The quantities of a column, each with its name in a mapping, the column it has in a file without a mapping, and
+    /// the unit of that column.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Quantity: (&'static str, &'static str, Unit) {
+        /// Time.
+        Time = ("time", "time_s", Unit::Second),
+        /// Generator angle.
+        Generator = ("generator", "generator_rad", Unit::Radian),
+        /// Output angle.
+        Output = ("output", "output_rad", Unit::Radian),
+        /// Output angle less generator over ratio.
+        Error = ("error", "error_arcsec", Unit::Arcsecond),
+        /// Load torque at the output.
+        Torque = ("torque", "torque_n_m", Unit::NewtonMetre),
+        /// Temperature.
+        Temperature = ("temperature", "temperature_c", Unit::Celsius),
+        /// Angle of the drive against gravity.
+        Orientation = ("orientation", "orientation_rad", Unit::Radian),
+    }
 }
 
 impl Quantity {
-    /// All of them.
-    pub(crate) const ALL: [Quantity; 7] = [
-        Quantity::Time,
-        Quantity::Generator,
-        Quantity::Output,
-        Quantity::Error,
-        Quantity::Torque,
-        Quantity::Temperature,
-        Quantity::Orientation,
-    ];
-
-    /// Its name in a mapping, the column it has in a file without a mapping, and the unit of that column.
-    fn spec(self) -> (&'static str, &'static str, Unit) {
-        match self {
-            Quantity::Time => ("time", "time_s", Unit::Second),
-            Quantity::Generator => ("generator", "generator_rad", Unit::Radian),
-            Quantity::Output => ("output", "output_rad", Unit::Radian),
-            Quantity::Error => ("error", "error_arcsec", Unit::Arcsecond),
-            Quantity::Torque => ("torque", "torque_n_m", Unit::NewtonMetre),
-            Quantity::Temperature => ("temperature", "temperature_c", Unit::Celsius),
-            Quantity::Orientation => ("orientation", "orientation_rad", Unit::Radian),
-        }
-    }
-
     /// Its name in a mapping.
     pub fn name(self) -> &'static str {
-        self.spec().0
+        self.row().0
     }
 
     /// The column it has in a file without a mapping, and the unit there.
     pub(crate) fn default_column(self) -> (&'static str, Unit) {
-        let (_, column, unit) = self.spec();
+        let (_, column, unit) = self.row();
         (column, unit)
     }
 
     /// The family of its units.
     pub(crate) fn family(self) -> Family {
-        match self {
-            Quantity::Time => Family::Time,
-            Quantity::Torque => Family::Torque,
-            Quantity::Temperature => Family::Temperature,
-            _ => Family::Angle,
-        }
+        self.row().2.family()
     }
 
     /// The refusal of a reading, in words.

@@ -4,103 +4,63 @@ use serde::Serialize;
 
 use super::columns::Quantity;
 
-/// Name of a data fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FaultName {
-    /// The count of an encoder is off by a constant from some instant on.
-    EncoderIndexJump,
-    /// A channel repeats one value while it should change.
-    FrozenChannel,
-    /// Values or rows that were not recorded.
-    MissingSamples,
-    /// Time that runs back, stands, jumps or jitters.
-    ClockError,
-    /// Single rows that neither the rows before nor those after bear out.
-    Outliers,
-    /// A unit, a sign or a column taken for another.
-    UnitMismatch,
-    /// A resolution too coarse for the noise to blur it.
-    Quantisation,
-    /// A zero that moves with time, the same in every state of the drive.
-    Drift,
-    /// The two angles are not read at one instant, and the time between them scatters.
-    ReadJitter,
-    /// The logger stands still after each block of this many rows, and its time counts on.
-    Stalls,
-    /// The counter of an angle begins anew between sessions, whole turns of the motor off.
-    CounterRestart,
-    /// The torque counts against the sign that the wind-up shows.
-    TorqueSign,
-    /// The torque is of another shaft, in another unit, or of something else.
-    TorqueScale,
-    /// The torque reads a load where there is none.
-    TorqueZero,
-    /// The count of an angle leaps by whole turns, or its zero is another one from a session on.
-    PositionJump,
-    /// Rows are means over some time.
-    AveragedRows,
+table! {
+    /// Name of a data fault.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum FaultName: (&'static str, &'static str) {
+        /// The count of an encoder is off by a constant from some instant on.
+        EncoderIndexJump = ("encoder_index_jump", "check the cable, the shield and the index of the encoder"),
+        /// A channel repeats one value while it should change.
+        FrozenChannel = ("frozen_channel",
+            "log every channel anew in each row; check the bus for values that are repeated"),
+        /// Values or rows that were not recorded.
+        MissingSamples = ("missing_samples", "log at a rate that bus and disk keep up with"),
+        /// Time that runs back, stands, jumps or jitters.
+        ClockError = ("clock_error", "stamp each row with the clock of the controller when the angles are read"),
+        /// Single rows that neither the rows before nor those after bear out.
+        Outliers = ("outliers", "check the cable and the interface of the encoder; latch both angles together"),
+        /// A unit, a sign or a column taken for another.
+        UnitMismatch = ("unit_mismatch",
+            "map the columns with their units: --columns generator=NAME:UNIT,output=NAME:UNIT,torque=NAME:UNIT"),
+        /// A resolution too coarse for the noise to blur it.
+        Quantisation = ("quantisation", "log the full resolution of the encoder and of the torque"),
+        /// A zero that moves with time, the same in every state of the drive.
+        Drift = ("drift", "let bench and encoder come to a steady temperature; look after the mount of the encoder"),
+        /// The two angles are not read at one instant, and the time between them scatters.
+        ReadJitter = ("read_jitter",
+            "latch both angles by one signal, or read both in one cycle of the bus; turn more slowly meanwhile"),
+        /// The logger stands still after each block of this many rows, and its time counts on.
+        Stalls = ("stalls",
+            "log the time of a clock instead of counting rows; write to disk outside of the loop that reads"),
+        /// The counter of an angle begins anew between sessions, whole turns of the motor off.
+        CounterRestart = ("counter_restart", "log the turns of the motor, or home it before each session"),
+        /// The torque counts against the sign that the wind-up shows.
+        TorqueSign = ("torque_sign",
+            "turn the sign of the torque round: it is positive where it turns the output forward"),
+        /// The torque is of another shaft, in another unit, or of something else.
+        TorqueScale = ("torque_scale", "log the torque at the output of this drive, in N·m"),
+        /// The torque reads a load where there is none.
+        TorqueZero = ("torque_zero", "set the torque sensor to zero while the output bears no load, warm as in use"),
+        /// The count of an angle leaps by whole turns, or its zero is another one from a session on.
+        PositionJump = ("position_jump", "log the position unwrapped, and keep its zero from session to session"),
+        /// Rows are means over some time.
+        AveragedRows = ("averaged_rows",
+            "log what is read at one instant, or take means over less time than the output takes to its other flank"),
+    }
 }
 
 impl FaultName {
     /// Its name in files, snake case.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
-        match self {
-            FaultName::EncoderIndexJump => "encoder_index_jump",
-            FaultName::FrozenChannel => "frozen_channel",
-            FaultName::MissingSamples => "missing_samples",
-            FaultName::ClockError => "clock_error",
-            FaultName::Outliers => "outliers",
-            FaultName::UnitMismatch => "unit_mismatch",
-            FaultName::Quantisation => "quantisation",
-            FaultName::Drift => "drift",
-            FaultName::ReadJitter => "read_jitter",
-            FaultName::Stalls => "stalls",
-            FaultName::CounterRestart => "counter_restart",
-            FaultName::TorqueSign => "torque_sign",
-            FaultName::TorqueScale => "torque_scale",
-            FaultName::TorqueZero => "torque_zero",
-            FaultName::PositionJump => "position_jump",
-            FaultName::AveragedRows => "averaged_rows",
-        }
+        self.row().0
     }
 
     /// The change at the bench or in the logger by which it does not come back.
     #[must_use]
     pub const fn advice(self) -> &'static str {
-        match self {
-            FaultName::EncoderIndexJump => "check the cable, the shield and the index of the encoder",
-            FaultName::FrozenChannel => {
-                "log every channel anew in each row; check the bus for values that are repeated"
-            }
-            FaultName::MissingSamples => "log at a rate that bus and disk keep up with",
-            FaultName::ClockError => "stamp each row with the clock of the controller when the angles are read",
-            FaultName::Outliers => "check the cable and the interface of the encoder; latch both angles together",
-            FaultName::UnitMismatch => {
-                "map the columns with their units: --columns generator=NAME:UNIT,output=NAME:UNIT,torque=NAME:UNIT"
-            }
-            FaultName::Quantisation => "log the full resolution of the encoder and of the torque",
-            FaultName::Drift => {
-                "let bench and encoder come to a steady temperature; look after the mount of the encoder"
-            }
-            FaultName::ReadJitter => {
-                "latch both angles by one signal, or read both in one cycle of the bus; turn more slowly meanwhile"
-            }
-            FaultName::Stalls => {
-                "log the time of a clock instead of counting rows; write to disk outside of the loop that reads"
-            }
-            FaultName::CounterRestart => "log the turns of the motor, or home it before each session",
-            FaultName::TorqueSign => {
-                "turn the sign of the torque round: it is positive where it turns the output forward"
-            }
-            FaultName::TorqueScale => "log the torque at the output of this drive, in N·m",
-            FaultName::TorqueZero => "set the torque sensor to zero while the output bears no load, warm as in use",
-            FaultName::AveragedRows => {
-                "log what is read at one instant, or take means over less time than the output takes to its other flank"
-            }
-            FaultName::PositionJump => "log the position unwrapped, and keep its zero from session to session",
-        }
+        self.row().1
     }
 }
 

@@ -3,67 +3,71 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-/// Unit of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
-    /// rad
-    Radian,
-    /// deg
-    Degree,
-    /// gon: 400 make a turn
-    Gon,
-    /// turn
-    Turn,
-    /// arcmin
-    Arcminute,
-    /// arcsec
-    Arcsecond,
-    /// mrad
-    Milliradian,
-    /// Counts of an encoder; how many make a turn has to be said.
-    Count,
-    /// s
-    Second,
-    /// ms
-    Millisecond,
-    /// us
-    Microsecond,
-    /// ns
-    Nanosecond,
-    /// min
-    Minute,
-    /// h
-    Hour,
-    /// d: days, as spreadsheets count time.
-    Day,
-    /// Date and time, or time of day, as text.
-    Iso,
-    /// N.m
-    NewtonMetre,
-    /// N.cm
-    NewtonCentimetre,
-    /// N.mm
-    NewtonMillimetre,
-    /// mN.m
-    MillinewtonMetre,
-    /// kN.m
-    KilonewtonMetre,
-    /// lbf.in
-    PoundInch,
-    /// lbf.ft
-    PoundFoot,
-    /// A: a current; its torque for an ampere has to be said.
-    Ampere,
-    /// mA, likewise.
-    Milliampere,
-    /// V of a transducer, likewise.
-    Volt,
-    /// C
-    Celsius,
-    /// K
-    Kelvin,
-    /// F
-    Fahrenheit,
+table! {
+    /// Unit of a column, with its family, how people write it (its name in a mapping first) and its size in the unit
+    /// used inside (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its gain: a
+    /// turn, a N·m.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Unit: (Family, &'static [&'static str], f64) {
+        /// rad
+        Radian = (Family::Angle, &["rad"], 1.0),
+        /// deg
+        Degree = (Family::Angle, &["deg", "°"], TAU / 360.0),
+        /// gon: 400 make a turn
+        Gon = (Family::Angle, &["gon"], TAU / 400.0),
+        /// turn
+        Turn = (Family::Angle, &["turn", "turns", "rev", "revs"], TAU),
+        /// arcmin
+        Arcminute = (Family::Angle, &["arcmin"], TAU / 21_600.0),
+        /// arcsec
+        Arcsecond = (Family::Angle, &["arcsec"], TAU / 1_296_000.0),
+        /// mrad
+        Milliradian = (Family::Angle, &["mrad"], 1e-3),
+        /// Counts of an encoder; how many make a turn has to be said.
+        Count = (Family::Angle, &["count", "counts", "cnt", "inc", "incs", "tick", "ticks"], TAU),
+        /// s
+        Second = (Family::Time, &["s", "sec", "seconds"], 1.0),
+        /// ms
+        Millisecond = (Family::Time, &["ms"], 1e-3),
+        /// us
+        Microsecond = (Family::Time, &["us", "µs", "μs"], 1e-6),
+        /// ns
+        Nanosecond = (Family::Time, &["ns"], 1e-9),
+        /// min
+        Minute = (Family::Time, &["min"], 60.0),
+        /// h
+        Hour = (Family::Time, &["h"], 3600.0),
+        /// d: days, as spreadsheets count time.
+        Day = (Family::Time, &["d", "days", "day"], 86_400.0),
+        /// Date and time, or time of day, as text.
+        Iso = (Family::Time, &["iso"], 1.0),
+        /// N.m
+        NewtonMetre = (Family::Torque, &["N.m", "Nm", "N·m", "N*m", "N-m", "N m"], 1.0),
+        /// N.cm
+        NewtonCentimetre = (Family::Torque, &["N.cm", "Ncm", "N·cm"], 1e-2),
+        /// N.mm
+        NewtonMillimetre = (Family::Torque, &["N.mm", "Nmm", "N·mm"], 1e-3),
+        /// mN.m
+        MillinewtonMetre = (Family::Torque, &["mN.m", "mNm", "mN·m"], 1e-3),
+        /// kN.m
+        KilonewtonMetre = (Family::Torque, &["kN.m", "kNm", "kN·m"], 1e3),
+        /// lbf.in
+        PoundInch = (Family::Torque, &["lbf.in", "in.lbf", "in-lb", "lb-in", "lbf-in"], POUND_FORCE_N * 0.0254),
+        /// lbf.ft
+        PoundFoot = (Family::Torque, &["lbf.ft", "ft.lbf", "ft-lb", "lb-ft", "lbf-ft"], POUND_FORCE_N * 0.3048),
+        /// A: a current; its torque for an ampere has to be said.
+        Ampere = (Family::Torque, &["A"], 1.0),
+        /// mA, likewise.
+        Milliampere = (Family::Torque, &["mA"], 1.0),
+        /// V of a transducer, likewise.
+        Volt = (Family::Torque, &["V"], 1.0),
+        /// C
+        Celsius = (Family::Temperature, &["C", "°C", "degC"], 1.0),
+        /// K
+        Kelvin = (Family::Temperature, &["K"], 1.0),
+        /// F
+        Fahrenheit = (Family::Temperature, &["F", "°F", "degF"], 5.0 / 9.0),
+    }
 }
 
 /// The pound-force, N: 0.453 592 37 kg (1959) times the standard acceleration 9.806 65 m/s².
@@ -85,47 +89,9 @@ pub(crate) enum Family {
 impl Family {
     /// Its units.
     pub(crate) fn units(self) -> impl Iterator<Item = Unit> {
-        UNITS.iter().filter(move |row| row.1 == self).map(|row| row.0)
+        Unit::ALL.into_iter().filter(move |unit| unit.family() == self)
     }
 }
-
-/// A row of [`UNITS`].
-type Row = (Unit, Family, &'static [&'static str], f64);
-
-/// Each unit in the order of [`Unit`], with its family, how people write it (its name in a mapping first) and its size
-/// in the unit used inside (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its
-/// gain: a turn, a N·m.
-const UNITS: [Row; 29] = [
-    (Unit::Radian, Family::Angle, &["rad"], 1.0),
-    (Unit::Degree, Family::Angle, &["deg", "°"], TAU / 360.0),
-    (Unit::Gon, Family::Angle, &["gon"], TAU / 400.0),
-    (Unit::Turn, Family::Angle, &["turn", "turns", "rev", "revs"], TAU),
-    (Unit::Arcminute, Family::Angle, &["arcmin"], TAU / 21_600.0),
-    (Unit::Arcsecond, Family::Angle, &["arcsec"], TAU / 1_296_000.0),
-    (Unit::Milliradian, Family::Angle, &["mrad"], 1e-3),
-    (Unit::Count, Family::Angle, &["count", "counts", "cnt", "inc", "incs", "tick", "ticks"], TAU),
-    (Unit::Second, Family::Time, &["s", "sec", "seconds"], 1.0),
-    (Unit::Millisecond, Family::Time, &["ms"], 1e-3),
-    (Unit::Microsecond, Family::Time, &["us", "µs", "μs"], 1e-6),
-    (Unit::Nanosecond, Family::Time, &["ns"], 1e-9),
-    (Unit::Minute, Family::Time, &["min"], 60.0),
-    (Unit::Hour, Family::Time, &["h"], 3600.0),
-    (Unit::Day, Family::Time, &["d", "days", "day"], 86_400.0),
-    (Unit::Iso, Family::Time, &["iso"], 1.0),
-    (Unit::NewtonMetre, Family::Torque, &["N.m", "Nm", "N·m", "N*m", "N-m", "N m"], 1.0),
-    (Unit::NewtonCentimetre, Family::Torque, &["N.cm", "Ncm", "N·cm"], 1e-2),
-    (Unit::NewtonMillimetre, Family::Torque, &["N.mm", "Nmm", "N·mm"], 1e-3),
-    (Unit::MillinewtonMetre, Family::Torque, &["mN.m", "mNm", "mN·m"], 1e-3),
-    (Unit::KilonewtonMetre, Family::Torque, &["kN.m", "kNm", "kN·m"], 1e3),
-    (Unit::PoundInch, Family::Torque, &["lbf.in", "in.lbf", "in-lb", "lb-in", "lbf-in"], POUND_FORCE_N * 0.0254),
-    (Unit::PoundFoot, Family::Torque, &["lbf.ft", "ft.lbf", "ft-lb", "lb-ft", "lbf-ft"], POUND_FORCE_N * 0.3048),
-    (Unit::Ampere, Family::Torque, &["A"], 1.0),
-    (Unit::Milliampere, Family::Torque, &["mA"], 1.0),
-    (Unit::Volt, Family::Torque, &["V"], 1.0),
-    (Unit::Celsius, Family::Temperature, &["C", "°C", "degC"], 1.0),
-    (Unit::Kelvin, Family::Temperature, &["K"], 1.0),
-    (Unit::Fahrenheit, Family::Temperature, &["F", "°F", "degF"], 5.0 / 9.0),
-];
 
 /// Units at the end of a name that are written otherwise there.
 const IN_NAMES: [(&str, Unit); 4] =
@@ -139,17 +105,17 @@ impl Unit {
 
     /// Its name in a mapping.
     pub fn name(self) -> &'static str {
-        UNITS[self as usize].2[0]
+        self.row().1[0]
     }
 
     /// Its size in the unit used inside: rad, s, N·m, °C.
     pub(crate) fn factor(self) -> f64 {
-        UNITS[self as usize].3
+        self.row().2
     }
 
     /// The quantity that it measures.
     pub(crate) fn family(self) -> Family {
-        UNITS[self as usize].1
+        self.row().0
     }
 
     /// Its zero in the unit used inside.
@@ -182,7 +148,7 @@ impl Unit {
 
     /// The unit that people write so, if it is one.
     pub(super) fn written(text: &str) -> Option<Unit> {
-        UNITS.iter().find(|row| row.2.contains(&text)).map(|row| row.0)
+        Unit::ALL.into_iter().find(|unit| unit.row().1.contains(&text))
     }
 
     /// The text in brackets at the end of a name, known as a unit or not: `deg` of `Winkel [deg]`. A place in a list is
@@ -333,8 +299,7 @@ mod tests {
         assert!((read("F", Family::Temperature, 212.0) - 100.0).abs() < 1e-12);
         assert!((read("lbf.ft", Family::Torque, 1.0) - 1.355_817_948_331_400_4).abs() < 1e-12);
         assert!((read("min", Family::Time, 2.0) - 120.0).abs() < 1e-12);
-        for (k, (unit, ..)) in UNITS.into_iter().enumerate() {
-            assert_eq!(unit as usize, k);
+        for unit in Unit::ALL {
             assert_eq!(Unit::written(unit.name()), Some(unit));
         }
     }

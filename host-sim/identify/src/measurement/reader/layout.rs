@@ -25,43 +25,36 @@ const ROWS_OF_A_NAME: usize = 4;
 /// Seconds since 1970 of the years 2001 to 2065.
 const EPOCH_S: std::ops::RangeInclusive<f64> = 1e9..=3e9;
 
-/// The separator of two fields.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Separator {
-    /// `,`
-    #[default]
-    Comma,
-    /// `;`
-    Semicolon,
-    /// A tab.
-    Tab,
-    /// `|`
-    Bar,
-    /// Any number of spaces and tabs.
-    Blanks,
+table! {
+    /// The separator of two fields, with its name and the byte between them, of blanks the tab that [`with_tabs`] puts
+    /// in their place. Of several that fit the first is taken.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+    pub enum Separator: (&'static str, u8) {
+        /// `,`
+        #[default]
+        Comma = ("comma", b','),
+        /// `;`
+        Semicolon = ("semicolon", b';'),
+        /// A tab.
+        Tab = ("tab", b'\t'),
+        /// `|`
+        Bar = ("bar", b'|'),
+        /// Any number of spaces and tabs.
+        Blanks = ("blanks", b'\t'),
+    }
 }
 
 impl Separator {
-    /// Each in the order of the enum, with its name and the byte between two fields, of blanks the tab that
-    /// [`with_tabs`] puts in their place. Of several that fit the first is taken.
-    const ALL: [(Separator, &'static str, u8); 5] = [
-        (Separator::Comma, "comma", b','),
-        (Separator::Semicolon, "semicolon", b';'),
-        (Separator::Tab, "tab", b'\t'),
-        (Separator::Bar, "bar", b'|'),
-        (Separator::Blanks, "blanks", b'\t'),
-    ];
-
     /// Its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        Separator::ALL[self as usize].1
+        self.row().0
     }
 
     /// Records of a text; of one with [`Separator::Blanks`] as [`with_tabs`] writes it.
     pub(super) fn records(self, text: &[u8]) -> csv::Reader<&[u8]> {
         let mut form = csv::ReaderBuilder::new();
-        form.delimiter(Separator::ALL[self as usize].2).has_headers(false).flexible(true).from_reader(text)
+        form.delimiter(self.row().1).has_headers(false).flexible(true).from_reader(text)
     }
 }
 
@@ -350,7 +343,7 @@ fn lines(head: &[u8], separator: Separator) -> Vec<HeadLine> {
 /// head.
 fn guess(head: &[u8]) -> Option<(Layout, Vec<HeadLine>)> {
     let mut best: Option<(f64, (Layout, Vec<HeadLine>))> = None;
-    for (separator, ..) in Separator::ALL {
+    for separator in Separator::ALL {
         let lines = lines(head, separator);
         // Behind a preamble, if there is one.
         let some = &lines[lines.len() / 3..];
