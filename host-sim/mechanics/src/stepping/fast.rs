@@ -271,7 +271,7 @@ impl<'p> CondensedWheels<'p> {
         };
         let geometric = Geometric { a: &state.turn_rate, g: &g, c };
         let contact = |matrix: &mut [f64], order: usize| self.add_bore_contact(j, matrix, order);
-        tangent.reduce(self.kernels, cell, place, tractions, Some(geometric), contact, contribution)
+        tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), contact, contribution)
     }
 
     /// Adds the contact on the bore of a cell to the matrix of its bore and face nodes; whether there is any.
@@ -332,7 +332,7 @@ impl<'p> CondensedWheels<'p> {
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
         };
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
-        tangent.reduce(self.kernels, cell, place, tractions, None, |_, _| false, contribution)
+        tangent.reduce(self.kernels, cell, (place, tractions), None, |_, _| false, contribution)
     }
 
     /// Places the flank nodes of these cells where they stand while no force acts on them.
