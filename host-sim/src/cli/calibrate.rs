@@ -12,8 +12,8 @@ use super::{Failure, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
-    Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, Split, calibrate, calibrate_and_split, one_in,
-    plan,
+    Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, Split, TorqueLoop, calibrate,
+    calibrate_and_split, one_in, plan,
 };
 use flexspline_identify::diagnosis::Subject;
 use flexspline_identify::extension::Model;
@@ -171,6 +171,12 @@ impl Calibrate {
             .map(|file| read_known(file, &map, &prior.nominal, prior.table))
             .collect::<Result<Vec<_>, _>>();
         let mut files = files.map_err(bad_input)?;
+        if let Some(found) = TorqueLoop::of(&files) {
+            let (out, mut outputs) = (context.out()?, Outputs::new());
+            outputs.json(&out.join("torque_loop.json"), &found)?;
+            outputs.finish()?;
+            return context.print(&found, || format!("{found}\nwrote to {}/: torque_loop.json", out.display()));
+        }
         let subject = |model| context.drive().map(|drive| Subject::of_model(model, drive, self.generator));
         let subject = model.map(subject).transpose()?;
         let known = subject.map_or(Ok(None), |subject| subject.known_before(&mut files)).map_err(bad_input)?;

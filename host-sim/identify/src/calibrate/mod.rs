@@ -12,6 +12,7 @@
 //! choice, penalties and fit are all made without the fold that they are judged in. No part is fitted where nothing was
 //! recorded that could show it, and no table is made that leaves more than a simpler one.
 
+mod at_rest;
 mod choose;
 mod folds;
 mod interval;
@@ -32,6 +33,7 @@ use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
 use crate::misfit::LEAVES;
+pub use at_rest::{Told, TorqueLoop};
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};

@@ -51,8 +51,9 @@ pub struct Chain {
     /// First unknown of each block in a right-hand side.
     offsets: Vec<usize>,
     unknowns: usize,
-    /// Work space.
+    /// Work space: the front, and matrices that have been used up.
     front: Vec<f64>,
+    spare: Vec<Vec<f64>>,
 }
 
 impl Chain {
@@ -110,15 +111,13 @@ impl Chain {
             self.values.extend_from_slice(&self.front[..m * size]);
             let later = members.split_off(1);
             for u in std::mem::take(&mut updates_at[block as usize]) {
-                updates[u as usize].matrix = Vec::new();
+                self.spare.push(std::mem::take(&mut updates[u as usize].matrix));
             }
             if let Some(&next) = later.first() {
-                let q = m - size;
-                let mut matrix = vec![0.0; q * q];
-                for j in 0..q {
-                    let column = (size + j) * m + size;
-                    matrix[j * q + j..(j + 1) * q].copy_from_slice(&self.front[column + j..column + q]);
-                }
+                let mut matrix = self.spare.pop().unwrap_or_default();
+                matrix.clear();
+                let left = self.front.chunks_exact(m).skip(size);
+                left.for_each(|column| matrix.extend_from_slice(&column[size..]));
                 updates_at[next as usize].push(updates.len() as u32);
                 updates.push(Contribution { blocks: later.clone(), matrix });
             }

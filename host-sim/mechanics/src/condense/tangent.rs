@@ -116,40 +116,38 @@ impl CellAt<'_> {
 }
 
 impl CellTangent {
-    /// Reduces a cell. `contact` adds what touches the bore to the lower triangle of the matrix of bore and faces (of
-    /// the given order) and says whether it did.
+    /// Reduces a cell to its contribution; false where it is not stiff. `contact` adds what touches the bore to the lower
+    /// triangle of the matrix of bore and faces (of the given order) and says whether it did.
     pub fn reduce(
         &mut self,
         kernels: DenseKernels,
         cell: &Cell,
-        place: CellPlacement,
-        tractions: Vec<Traction>,
+        (place, tractions): (CellPlacement, Vec<Traction>),
         geometric: Option<Geometric>,
         contact: impl FnOnce(&mut [f64], usize) -> bool,
-    ) -> Option<Contribution> {
+        Contribution { blocks, matrix }: &mut Contribution,
+    ) -> bool {
         let (f, b, i) = (cell.flank(), cell.bore(), 2 * cell.face());
         let r = b + i;
         self.place = place;
         self.tractions = tractions;
 
         // Bore and faces.
-        let mut front = cell.body.clone();
-        self.panel.clear();
-        if contact(&mut front, r) {
-            if !kernels.eliminate(&mut front, r, b, 1.0) {
-                return None;
-            }
-            self.panel.extend_from_slice(&front[..r * b]);
-        } else {
-            front.copy_from_slice(&cell.free_body);
+        self.panel.clone_from(&cell.body);
+        let touched = contact(&mut self.panel, r);
+        if touched && !kernels.eliminate(&mut self.panel, r, b, 1.0) {
+            return false;
         }
+        let front = if touched { &self.panel } else { &cell.free_body };
         let columns: Vec<(usize, &[f64])> = self.tractions.iter().flat_map(|t| t.forces()).collect();
         let n = i + columns.len();
-        let mut matrix = vec![0.0; n * n];
+        matrix.clear();
+        matrix.resize(n * n, 0.0);
         for col in 0..i {
             let from = (b + col) * r + b;
             matrix[col * n + col..col * n + i].copy_from_slice(&front[from + col..from + i]);
         }
+        self.panel.truncate(if touched { r * b } else { 0 });
 
         // Tractions, then the geometric row: flank nodes, bore nodes, one row after the other.
         let panel = if self.panel.is_empty() { &cell.free_body[..r * b] } else { &self.panel };
@@ -209,10 +207,11 @@ impl CellTangent {
             self.turn_rate.extend_from_slice(a);
             self.flank_geometric.extend_from_slice(geometric_flank);
         }
-        rotate_faces(&mut matrix, n, i / 2, &self.place.faces);
-        let mut blocks = self.place.blocks.to_vec();
+        rotate_faces(matrix, n, i / 2, &self.place.faces);
+        blocks.clear();
+        blocks.extend(self.place.blocks);
         blocks.extend(self.tractions.iter().map(|t| t.block));
-        Some(Contribution { blocks, matrix })
+        true
     }
 
     fn panel<'a>(&'a self, cell: &'a Cell) -> &'a [f64] {

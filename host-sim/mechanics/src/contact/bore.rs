@@ -121,25 +121,30 @@ impl BoreContact {
         mut report: impl FnMut(&BorePressure),
     ) {
         let turn @ (sin, cos) = generator_rad.sin_cos();
-        let foot = |x: [f64; 2]| -> OutlineFoot {
-            let foot = outline.nearest(rotate(x, (-sin, cos)));
-            OutlineFoot { normal: rotate(foot.normal, turn), ..foot }
+        let feet_of = |points: &[[f64; 2]], feet: &mut Vec<OutlineFoot>| {
+            let points: Vec<[f64; 2]> = points.iter().map(|x| rotate(*x, (-sin, cos))).collect();
+            outline.nearest_each(&points, feet);
+            feet.iter_mut().for_each(|foot| foot.normal = rotate(foot.normal, turn));
         };
         open.until.resize(self.edges.len(), 0.0);
-        // Gap at the end of the edge before, if it was looked at.
-        let mut shared = None;
-        for (edge, nodes) in self.edges.iter().enumerate() {
-            if open.moved < open.until[edge] {
-                shared = None;
-                continue;
-            }
-            let node_u = nodes.map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
-            let gap = |k: usize| {
-                let ([x, y], [dx, dy]) = (self.places[edge][k], node_u[k]);
-                foot([x + dx, y + dy]).distance
-            };
-            let gaps = [shared.unwrap_or_else(|| gap(0)), gap(1), gap(2)];
-            shared = Some(gaps[2]);
+        let node_u = |edge: usize| self.edges[edge].map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
+        let is_known = |edge: &usize| open.moved < open.until[*edge];
+        let looked_at: Vec<usize> = (0..self.edges.len()).filter(|edge| !is_known(edge)).collect();
+        // Where an edge begins the one before has ended, if it is looked at.
+        let begins = |k: usize| k == 0 || looked_at[k - 1] + 1 != looked_at[k];
+        let mut points = Vec::with_capacity(3 * looked_at.len());
+        for (k, &edge) in looked_at.iter().enumerate() {
+            let moved = self.places[edge].iter().zip(node_u(edge)).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]);
+            points.extend(moved.skip(usize::from(!begins(k))));
+        }
+        let (mut ends, mut feet) = (Vec::new(), Vec::new());
+        feet_of(&points, &mut ends);
+        let mut ends = ends.iter().map(|foot| foot.distance);
+        let mut next = || ends.next().expect("one for each point");
+        let mut before = 0.0;
+        for (k, &edge) in looked_at.iter().enumerate() {
+            let gaps = [if begins(k) { next() } else { before }, next(), next()];
+            before = gaps[2];
             // Along the edge the gap is quadratic to BORE_SMOOTHNESS, and a quadratic lies above its Bernstein
             // coefficients.
             let bound = gaps[0].min(gaps[2]).min(2.0 * gaps[1] - 0.5 * (gaps[0] + gaps[2])) - BORE_SMOOTHNESS;
@@ -150,13 +155,15 @@ impl BoreContact {
             let mut contact =
                 BorePressure { edge, force: [0.0; 6], stiffness: [0.0; 21], moment: 0.0, peak: 0.0, energy: 0.0 };
             let mut touching = false;
-            let places = &self.point_places[edge * self.points.len()..];
-            for ((weight, n), place) in self.points.iter().zip(places) {
-                let x = [
-                    place[0] + n[0] * node_u[0][0] + n[1] * node_u[1][0] + n[2] * node_u[2][0],
-                    place[1] + n[0] * node_u[0][1] + n[1] * node_u[1][1] + n[2] * node_u[2][1],
-                ];
-                let foot = foot(x);
+            let node_u = node_u(edge);
+            points.clear();
+            points.extend(self.points.iter().zip(&self.point_places[edge * self.points.len()..]).map(
+                |((_, n), place)| {
+                    [0, 1].map(|k| place[k] + n[0] * node_u[0][k] + n[1] * node_u[1][k] + n[2] * node_u[2][k])
+                },
+            ));
+            feet_of(&points, &mut feet);
+            for (((weight, n), x), foot) in self.points.iter().zip(&points).zip(&feet) {
                 if foot.distance >= 0.0 {
                     continue;
                 }

@@ -16,10 +16,15 @@ use super::neutral::NeutralCurve;
 use super::ring::{GeneratorKind, RingShape};
 use super::spec::Drive;
 use crate::toml_file::Problem;
+use pulp::{Arch, NullaryFnOnce};
 use std::f64::consts::TAU;
 
 /// A Newton step, rad, below which the next one is below round-off: convergence is quadratic, with a factor near one.
 const LAST_STEP: f64 = 1e-8;
+/// Turns, rad, whose sine and cosine are those of a short series.
+const SMALL: f64 = 5e-3;
+/// Points whose feet are looked for together: a vector of the widest unit.
+const LANES: usize = 8;
 
 /// A wave generator in its own frame (major axis along +x).
 #[derive(Debug, Clone)]
@@ -32,6 +37,7 @@ pub struct GeneratorOutline {
     /// where the outline stands beside the axis it turns about, mm
     centre: [f64; 2],
     contour: Contour,
+    arch: Arch,
 }
 
 #[derive(Debug, Clone)]
@@ -135,7 +141,14 @@ impl GeneratorOutline {
         }
         let centre =
             direction(built.generator_eccentricity_phase_deg).map(|x| 1e-3 * built.generator_eccentricity_um * x);
-        Ok(GeneratorOutline { neutral, offset, scale: drive.thermal_state.generator_scale, centre, contour })
+        Ok(GeneratorOutline {
+            neutral,
+            offset,
+            scale: drive.thermal_state.generator_scale,
+            centre,
+            contour,
+            arch: Arch::new(),
+        })
     }
 
     /// Where the outline stands beside the axis it turns about, in the generator frame, mm.
@@ -157,46 +170,66 @@ impl GeneratorOutline {
         }
     }
 
-    /// Closest point of the outline to `point`, in the generator frame. For circles, the circle of the quadrant of
-    /// `point`, which is the closest one.
+    /// Closest point of the outline to `point`, in the generator frame.
     pub fn nearest(&self, point: [f64; 2]) -> OutlineFoot {
-        let s = self.scale;
-        let (px, py) = (point[0] / s - self.centre[0], point[1] / s - self.centre[1]);
+        let mut feet = Vec::new();
+        self.nearest_each(&[point], &mut feet);
+        feet[0]
+    }
+
+    /// Closest points of the outline to `points`, in the generator frame. For circles, the circle of the quadrant of a
+    /// point, which is the closest one; for a cam, as many at once as a vector unit takes.
+    pub(crate) fn nearest_each(&self, points: &[[f64; 2]], feet: &mut Vec<OutlineFoot>) {
+        let (s, [cx, cy]) = (self.scale, self.centre);
+        let within = |[x, y]: [f64; 2]| [x / s - cx, y / s - cy];
+        feet.clear();
         match &self.contour {
-            Contour::Circles { lobe, other_lobe, radius } => {
+            Contour::Circles { lobe, other_lobe, radius } => feet.extend(points.iter().map(|point| {
+                let [px, py] = within(*point);
                 let [x, y] = if px.is_sign_negative() { *other_lobe } else { *lobe };
                 let dx = px - x.copysign(px);
                 let dy = py - if y == 0.0 { 0.0 } else { y.copysign(py) };
                 let length = (dx * dx + dy * dy).sqrt();
                 let normal = if length > 0.0 { [dx / length, dy / length] } else { [1.0, 0.0] };
                 OutlineFoot { distance: (length - radius) * s, normal, curvature: 1.0 / (radius * s) }
-            }
+            })),
             Contour::Cam { form } => {
-                let (sin, cos) = self.foot_on_neutral(px, py);
-                let [r, dr, ddr] = self.neutral.polar_at((sin, cos));
-                let speed = (r * r + dr * dr).sqrt();
-                let normal = [(r * cos + dr * sin) / speed, (r * sin - dr * cos) / speed];
-                let from_neutral = (px - r * cos) * normal[0] + (py - r * sin) * normal[1];
-                let bend = (r * r + 2.0 * dr * dr - r * ddr) / (speed * speed * speed);
-                let foot = OutlineFoot {
-                    distance: (from_neutral + self.offset) * s,
-                    normal,
-                    curvature: bend / (1.0 - self.offset * bend) / s,
-                };
-                if form.is_empty() {
-                    return foot;
-                }
-                let [error, rate, bent] = form_error(form, sin.atan2(cos));
-                // Arc per angle through the point, and along the outline.
-                let (at_point, at_outline) = (speed * (1.0 + bend * from_neutral), speed * (1.0 - bend * self.offset));
-                let slope = rate / at_point;
-                let curvature = foot.curvature * s;
-                OutlineFoot {
-                    distance: foot.distance - error * s,
-                    normal: [normal[0] + slope * normal[1], normal[1] - slope * normal[0]],
-                    curvature: (curvature - bent / (at_outline * at_outline) - curvature * curvature * error) / s,
+                for points in points.chunks(LANES) {
+                    let at = std::array::from_fn(|k| within(points[k.min(points.len() - 1)]));
+                    let found = self.arch.dispatch(FeetOnNeutral { neutral: &self.neutral, at: &at });
+                    feet.extend(at.iter().zip(found).take(points.len()).map(|(at, found)| {
+                        self.on_cam(form, *at, found.unwrap_or_else(|| self.foot_by_scan(*at).sin_cos()))
+                    }));
                 }
             }
+        }
+    }
+
+    /// The foot of a point on a cam, that on the neutral curve being known.
+    fn on_cam(&self, form: &[Harmonic], [px, py]: [f64; 2], (sin, cos): (f64, f64)) -> OutlineFoot {
+        let s = self.scale;
+        let [r, dr, ddr] = self.neutral.cam_at((sin, cos));
+        let speed = (r * r + dr * dr).sqrt();
+        let normal = [(r * cos + dr * sin) / speed, (r * sin - dr * cos) / speed];
+        let from_neutral = (px - r * cos) * normal[0] + (py - r * sin) * normal[1];
+        let bend = (r * r + 2.0 * dr * dr - r * ddr) / (speed * speed * speed);
+        let foot = OutlineFoot {
+            distance: (from_neutral + self.offset) * s,
+            normal,
+            curvature: bend / (1.0 - self.offset * bend) / s,
+        };
+        if form.is_empty() {
+            return foot;
+        }
+        let [error, rate, bent] = form_error(form, sin.atan2(cos));
+        // Arc per angle through the point, and along the outline.
+        let (at_point, at_outline) = (speed * (1.0 + bend * from_neutral), speed * (1.0 - bend * self.offset));
+        let slope = rate / at_point;
+        let curvature = foot.curvature * s;
+        OutlineFoot {
+            distance: foot.distance - error * s,
+            normal: [normal[0] + slope * normal[1], normal[1] - slope * normal[0]],
+            curvature: (curvature - bent / (at_outline * at_outline) - curvature * curvature * error) / s,
         }
     }
 
@@ -229,42 +262,8 @@ impl GeneratorOutline {
         }
     }
 
-    /// Sine and cosine of the polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel
-    /// to it, so the foot on the cam has the same normal. Newton from the direction of the point, which at the bore is
-    /// off by 3e-4 rad; if it strays (points near the centre), a scan and bisection.
-    fn foot_on_neutral(&self, px: f64, py: f64) -> (f64, f64) {
-        let rho = (px * px + py * py).sqrt();
-        let mut foot = (py / rho, px / rho);
-        let mut turned = 0.0;
-        for _ in 0..8 {
-            let (f, df) = self.foot_residual(px, py, foot);
-            // also for a point in the centre, where all is NaN
-            if df.is_nan() || df >= 0.0 {
-                break;
-            }
-            let step = f / df;
-            foot = turned_by(foot, -step);
-            turned -= step;
-            if step.abs() < LAST_STEP {
-                return foot;
-            }
-            if turned.abs() > 0.5 {
-                break;
-            }
-        }
-        self.foot_by_scan(px, py).sin_cos()
-    }
-
-    /// `(p - P) · P'` and its derivative by the polar angle, given by its sine and cosine.
-    fn foot_residual(&self, px: f64, py: f64, (sin, cos): (f64, f64)) -> (f64, f64) {
-        let [r, dr, ddr] = self.neutral.polar_at((sin, cos));
-        // along and across the radius direction
-        let (a, b) = (px * cos + py * sin, py * cos - px * sin);
-        let f = a * dr + b * r - r * dr;
-        (f, a * (ddr - r) + 2.0 * b * dr - dr * dr - r * ddr)
-    }
-
-    fn foot_by_scan(&self, px: f64, py: f64) -> f64 {
+    /// Polar angle of the point of the neutral curve closest to a point, by a scan and bisection.
+    fn foot_by_scan(&self, [px, py]: [f64; 2]) -> f64 {
         const SCAN: usize = 256;
         let squared = |alpha: f64| {
             let r = self.neutral.polar(alpha)[0];
@@ -273,9 +272,56 @@ impl GeneratorOutline {
         let at = |k: usize| TAU * k as f64 / SCAN as f64;
         let best = (0..SCAN).min_by(|&i, &j| squared(at(i)).total_cmp(&squared(at(j)))).unwrap_or(0);
         // (p - P)·P' falls through zero at the closest point
-        let before = |alpha: f64| self.foot_residual(px, py, alpha.sin_cos()).0 > 0.0;
+        let before = |alpha: f64| foot_residual(&self.neutral, [px, py], alpha.sin_cos()).0 > 0.0;
         let [low, high] = halved(at(best) - at(1), at(best) + at(1), before);
         0.5 * (low + high)
+    }
+}
+
+/// `(p - P) · P'` on the neutral curve of a cam and its derivative by the polar angle, given by its sine and cosine.
+#[inline(always)]
+fn foot_residual(neutral: &NeutralCurve, [px, py]: [f64; 2], (sin, cos): (f64, f64)) -> (f64, f64) {
+    let [r, dr, ddr] = neutral.cam_at((sin, cos));
+    // along and across the radius direction
+    let (a, b) = (px * cos + py * sin, py * cos - px * sin);
+    let f = a * dr + b * r - r * dr;
+    (f, a * (ddr - r) + 2.0 * b * dr - dr * dr - r * ddr)
+}
+
+/// Sine and cosine of the polar angle of the points of the neutral curve of a cam closest to some points: the cam is
+/// parallel to it, so the foot on the cam has the same normal. Newton from the direction of the point, which at the
+/// bore is off by 3e-4 rad; nothing where it strays (points near the centre). Without branches, so that it is compiled
+/// for the vector unit.
+struct FeetOnNeutral<'a> {
+    neutral: &'a NeutralCurve,
+    at: &'a [[f64; 2]; LANES],
+}
+
+impl NullaryFnOnce for FeetOnNeutral<'_> {
+    type Output = [Option<(f64, f64)>; LANES];
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let (mut sin, mut cos) = ([0.0; LANES], [0.0; LANES]);
+        for (k, [px, py]) in self.at.iter().enumerate() {
+            let rho = (px * px + py * py).sqrt();
+            (sin[k], cos[k]) = (py / rho, px / rho);
+        }
+        let (mut found, mut strayed) = ([false; LANES], [false; LANES]);
+        for _ in 0..8 {
+            for k in 0..LANES {
+                let (f, df) = foot_residual(self.neutral, self.at[k], (sin[k], cos[k]));
+                let step = f / df;
+                let (s, c) = turned_by((sin[k], cos[k]), -step);
+                (sin[k], cos[k]) = if found[k] { (sin[k], cos[k]) } else { (s, c) };
+                strayed[k] |= !(found[k] || (df < 0.0 && step.abs() < SMALL));
+                found[k] |= step.abs() < LAST_STEP;
+            }
+            if found.iter().all(|found| *found) {
+                break;
+            }
+        }
+        std::array::from_fn(|k| (found[k] && !strayed[k]).then_some((sin[k], cos[k])))
     }
 }
 
@@ -291,17 +337,11 @@ impl super::spec::Generators {
     }
 }
 
-/// Sine and cosine of an angle turned by another.
-#[inline]
+/// Sine and cosine of an angle turned by less than [`SMALL`], where the series are exact to round-off.
+#[inline(always)]
 fn turned_by((sin, cos): (f64, f64), by: f64) -> (f64, f64) {
-    // below this the series are exact to round-off
-    const SMALL: f64 = 1e-3;
     let square = by * by;
-    let (s, c) = if by.abs() < SMALL {
-        (by * (1.0 - square / 6.0 * (1.0 - square / 20.0)), 1.0 - 0.5 * square * (1.0 - square / 12.0))
-    } else {
-        by.sin_cos()
-    };
+    let (s, c) = (by * (1.0 - square / 6.0 * (1.0 - square / 20.0)), 1.0 - 0.5 * square * (1.0 - square / 12.0));
     (sin * c + cos * s, cos * c - sin * s)
 }
 

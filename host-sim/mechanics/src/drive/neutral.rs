@@ -79,10 +79,10 @@ impl NeutralCurve {
         [self.radius_mm + self.constant_mm + w, dw, ddw]
     }
 
-    /// [`NeutralCurve::polar`] at the angle of this sine and cosine.
-    #[inline]
-    pub(crate) fn polar_at(&self, direction: (f64, f64)) -> [f64; 3] {
-        let [w, dw, ddw] = self.shape.radial_at(direction);
+    /// [`NeutralCurve::polar`] of a cam at the angle of this sine and cosine.
+    #[inline(always)]
+    pub(crate) fn cam_at(&self, direction: (f64, f64)) -> [f64; 3] {
+        let [w, dw, ddw] = self.shape.cam_at(direction);
         [self.radius_mm + self.constant_mm + w, dw, ddw]
     }
 

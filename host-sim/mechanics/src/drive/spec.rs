@@ -204,22 +204,31 @@ impl Default for ThermalState {
     }
 }
 
+/// What both toothed wheels have of their basic rack.
+macro_rules! rack {
+    ($($wheel:ident),*) => {$(
+        impl $wheel {
+            /// Pressure angle of the basic rack, rad.
+            pub(crate) fn pressure_angle_rad(&self) -> f64 {
+                self.pressure_angle_deg.to_radians()
+            }
+
+            /// Radius of the pitch circle, mm.
+            pub fn pitch_radius_mm(&self) -> f64 {
+                0.5 * self.module_mm * f64::from(self.teeth)
+            }
+
+            /// Radius of the base circle, mm.
+            pub fn base_radius_mm(&self) -> f64 {
+                self.pitch_radius_mm() * self.pressure_angle_rad().cos()
+            }
+        }
+    )*};
+}
+
+rack!(Flexspline, CircularSpline);
+
 impl Flexspline {
-    /// Pressure angle of the basic rack, rad.
-    pub(crate) fn pressure_angle_rad(&self) -> f64 {
-        self.pressure_angle_deg.to_radians()
-    }
-
-    /// Radius of the pitch circle, mm.
-    pub fn pitch_radius_mm(&self) -> f64 {
-        0.5 * self.module_mm * f64::from(self.teeth)
-    }
-
-    /// Radius of the base circle, mm.
-    pub fn base_radius_mm(&self) -> f64 {
-        self.pitch_radius_mm() * self.pressure_angle_rad().cos()
-    }
-
     /// Radius of the bore, mm.
     pub fn bore_radius_mm(&self) -> f64 {
         self.root_radius_mm - self.rim_thickness_mm
@@ -232,21 +241,6 @@ impl Flexspline {
 }
 
 impl CircularSpline {
-    /// Pressure angle of the basic rack, rad.
-    pub(crate) fn pressure_angle_rad(&self) -> f64 {
-        self.pressure_angle_deg.to_radians()
-    }
-
-    /// Radius of the pitch circle, mm.
-    pub fn pitch_radius_mm(&self) -> f64 {
-        0.5 * self.module_mm * f64::from(self.teeth)
-    }
-
-    /// Radius of the base circle, mm.
-    pub fn base_radius_mm(&self) -> f64 {
-        self.pitch_radius_mm() * self.pressure_angle_rad().cos()
-    }
-
     /// Angle between the circumference and the normal of a flank at the tip circle, where the flexspline's teeth come
     /// to bear, rad: `cos a = r_b / r` of the involute.
     pub fn bearing_flank_angle_rad(&self) -> f64 {

@@ -166,21 +166,18 @@ pub struct ToothFlank {
     teeth: u32,
 }
 
-impl ToothFlank {
-    /// The flexspline tooth.
-    pub fn external(drive: &Drive) -> Result<Self, DriveError> {
-        let wheel = &drive.flexspline;
+/// The flank of a wheel, whose fields are named alike on both; its S-shaped one is made by `$chain`.
+macro_rules! of_wheel {
+    ($drive:ident, $wheel:expr, $section:literal, $internal:literal, $chain:path, $scale:expr) => {{
+        let wheel = &$wheel;
         let half_base = half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad());
-        let shape = match wheel.profile {
+        let shape = match $drive.flexspline.profile {
             Profile::Involute => FlankShape::Involute { base_radius: wheel.base_radius_mm(), half_base },
-            Profile::S => {
-                let chain = s_tooth::tooth(&drive.as_dimensioned())?;
-                FlankShape::Chain(Arc::new(chain.scaled(drive.thermal_state.flexspline_scale)))
-            }
+            Profile::S => FlankShape::Chain(Arc::new($chain(&$drive.as_dimensioned())?.scaled($scale))),
         };
         Self::new(&WheelNumbers {
-            section: "flexspline",
-            internal: false,
+            section: $section,
+            internal: $internal,
             teeth: wheel.teeth,
             shape,
             root_radius: wheel.root_radius_mm,
@@ -188,29 +185,20 @@ impl ToothFlank {
             fillet: wheel.root_fillet_mm,
             rounding: wheel.tip_rounding_mm,
         })
+    }};
+}
+
+impl ToothFlank {
+    /// The flexspline tooth.
+    pub fn external(drive: &Drive) -> Result<Self, DriveError> {
+        let scale = drive.thermal_state.flexspline_scale;
+        of_wheel!(drive, drive.flexspline, "flexspline", false, s_tooth::tooth, scale)
     }
 
     /// The circular-spline space.
     pub fn internal(drive: &Drive) -> Result<Self, DriveError> {
-        let wheel = &drive.circular_spline;
-        let half_base = half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad());
-        let shape = match drive.flexspline.profile {
-            Profile::Involute => FlankShape::Involute { base_radius: wheel.base_radius_mm(), half_base },
-            Profile::S => {
-                let chain = s_tooth::space(&drive.as_dimensioned())?;
-                FlankShape::Chain(Arc::new(chain.scaled(drive.thermal_state.circular_spline_scale)))
-            }
-        };
-        Self::new(&WheelNumbers {
-            section: "circular_spline",
-            internal: true,
-            teeth: wheel.teeth,
-            shape,
-            root_radius: wheel.root_radius_mm,
-            tip_radius: wheel.tip_radius_mm,
-            fillet: wheel.root_fillet_mm,
-            rounding: wheel.tip_rounding_mm,
-        })
+        let scale = drive.thermal_state.circular_spline_scale;
+        of_wheel!(drive, drive.circular_spline, "circular_spline", true, s_tooth::space, scale)
     }
 
     fn new(wheel: &WheelNumbers) -> Result<Self, DriveError> {

@@ -193,6 +193,8 @@ pub(super) struct CondensedWheels<'p> {
     bore: Vec<(usize, [f64; 21])>,
     flanks: Vec<(FlankPair, Vec<f64>)>,
     factor: Kept,
+    /// Work space of a factorisation.
+    contributions: Vec<Contribution>,
     /// Pitches by which the state is turned against the one that the factor was made for.
     turned: isize,
 }
@@ -214,6 +216,7 @@ impl<'p> CondensedWheels<'p> {
             bore: Vec::new(),
             flanks: Vec::new(),
             factor: Rc::default(),
+            contributions: Vec::new(),
             turned: 0,
         }
     }
@@ -252,7 +255,8 @@ impl<'p> CondensedWheels<'p> {
         j: usize,
         tangent: &mut CellTangent,
         tractions: Vec<Traction>,
-    ) -> Option<Contribution> {
+        contribution: &mut Contribution,
+    ) -> bool {
         let mesh = self.model.fs_mesh();
         let (cell, _) = self.model.flexspline.cell(j, self.live[j]);
         let state = &self.states[j];
@@ -266,9 +270,8 @@ impl<'p> CondensedWheels<'p> {
             blocks: [j as u32, ((j + 1) % mesh.teeth) as u32],
         };
         let geometric = Geometric { a: &state.turn_rate, g: &g, c };
-        tangent.reduce(self.kernels, cell, place, tractions, Some(geometric), |matrix, order| {
-            self.add_bore_contact(j, matrix, order)
-        })
+        let contact = |matrix: &mut [f64], order: usize| self.add_bore_contact(j, matrix, order);
+        tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), contact, contribution)
     }
 
     /// Adds the contact on the bore of a cell to the matrix of its bore and face nodes; whether there is any.
@@ -320,7 +323,8 @@ impl<'p> CondensedWheels<'p> {
         t: usize,
         tangent: &mut CellTangent,
         tractions: Vec<Traction>,
-    ) -> Option<Contribution> {
+        contribution: &mut Contribution,
+    ) -> bool {
         let (first, mesh) = (self.model.fs_mesh().teeth, self.model.cs_mesh());
         let place = CellPlacement {
             frame: cs_frame(mesh, t).sin_cos(),
@@ -328,7 +332,7 @@ impl<'p> CondensedWheels<'p> {
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
         };
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
-        tangent.reduce(self.kernels, cell, place, tractions, None, |_, _| false)
+        tangent.reduce(self.kernels, cell, (place, tractions), None, |_, _| false, contribution)
     }
 
     /// Places the flank nodes of these cells where they stand while no force acts on them.
@@ -553,23 +557,17 @@ impl Wheels for CondensedWheels<'_> {
         factor.cells.resize_with(self.live.len(), CellTangent::default);
         let fs_cells = self.model.flexspline.count();
         factor.live.clone_from(&self.live);
-        let mut contributions = Vec::with_capacity(2 * factor.cells.len());
-        let mut definite = true;
-        for (c, tangent) in factor.cells.iter_mut().enumerate() {
+        let mut contributions = std::mem::take(&mut self.contributions);
+        contributions.resize_with(factor.cells.len(), Contribution::default);
+        let mut cells = factor.cells.iter_mut().zip(&mut contributions).enumerate();
+        let mut definite = cells.all(|(c, (tangent, contribution))| {
             let tractions = std::mem::take(&mut tractions[c]);
-            let reduced = if c < fs_cells {
-                self.reduce_flexspline_cell(c, tangent, tractions)
+            if c < fs_cells {
+                self.reduce_flexspline_cell(c, tangent, tractions, contribution)
             } else {
-                self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions)
-            };
-            match reduced {
-                Some(contribution) => contributions.push(contribution),
-                None => {
-                    definite = false;
-                    break;
-                }
+                self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions, contribution)
             }
-        }
+        });
         if definite {
             let blocks = self.blocks(&ranks);
             // Springs, the anchor (tangential is y in the frame of a face), and the unit of the tractions.
@@ -587,6 +585,7 @@ impl Wheels for CondensedWheels<'_> {
             }
             definite = factor.chain.factorise(&blocks, &contributions);
         }
+        self.contributions = contributions;
         self.factor = Rc::new(factor);
         self.turned = 0;
         definite

@@ -1,0 +1,281 @@
+//! A torque loop at rest: what gives way beyond a spring, play or contact that hardens.
+//!
+//! The generator stands, the load goes round, and the output errs by
+//!
+//! ```text
+//! zero of the log + c0 flank + a sign(x) |x|^p + loss way (1 - x^2)         x: load over the largest
+//! ```
+//!
+//! Play turns over to the other flank at a knee, the same both ways, and stays there as the load comes back: a loop.
+//! Contact of curved bodies (Hertz) goes with the power ⅔ of the load and leaves none. Both are laid beside a spring
+//! and a loss, and the one that leaves more than the other is rejected.
+
+use serde::Serialize;
+
+use crate::least_squares::{Normal, jackknife};
+use crate::measurement::{Recording, least_and_most, white_noise};
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// A generator that moves by less than this stands, rad. *Guess*: a tenth of a tooth pitch.
+const STANDS_RAD: f64 = 3.5e-3;
+/// The load goes round if the smaller end is this share of the larger. *Guess*.
+const BOTH_ENDS: f64 = 0.5;
+/// The load turns round where it comes back by this share of the largest, or of the noise by the other. *Guesses*.
+const COMES_BACK: f64 = 0.03;
+const BEYOND_NOISE: f64 = 6.0;
+/// Loads at which the flank may turn over, of the largest. *Guess*.
+const KNEES: [f64; 2] = [0.0, 0.25];
+/// Knees that are tried in an interval, which is then that between the neighbours of the best, this often.
+const KNEES_TRIED: usize = 16;
+const KNEES_NARROWED: usize = 4;
+/// Power of the load by which curved bodies approach, of Hertz's contact (Johnson, *Contact Mechanics*, 4.2).
+const HERTZ: f64 = 2.0 / 3.0;
+/// Powers that are looked among. *Guess*.
+const POWERS: [f64; 2] = [0.3, 1.5];
+/// Blocks of a loop that are left out in turn, and Student's t of one less, 95 %.
+const BLOCKS: usize = 8;
+const OF_95: f64 = 2.365;
+
+/// A figure with the half width of its interval, 95 %, as blocks left out change it: what the laws above do not have,
+/// as a spring that bends, comes on top.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Told {
+    /// The figure.
+    pub value: f64,
+    /// Half width.
+    pub half_width: f64,
+}
+
+/// What a torque loop at rest says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TorqueLoop {
+    /// Rows.
+    pub rows: usize,
+    /// Largest load, N·m.
+    pub most_n_m: f64,
+    /// Half of the play, arcsec.
+    pub c0_arcsec: Told,
+    /// Load at which it is crossed, either way, N·m.
+    pub knee_n_m: f64,
+    /// Power of the load by which the output gives way beside the play.
+    pub exponent: Told,
+    /// Half of what way up and way down are apart at no load, the play aside, arcsec.
+    pub loss_arcsec: Told,
+    /// Which of `play` and `hertz` the loop rejects.
+    pub rejects: Option<&'static str>,
+}
+
+impl std::fmt::Display for Told {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = f.precision().unwrap_or(1);
+        write!(f, "{:.digits$} ± {:.digits$}", self.value, self.half_width)
+    }
+}
+
+impl std::fmt::Display for TorqueLoop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let TorqueLoop { rows, c0_arcsec, knee_n_m, exponent, loss_arcsec, .. } = self;
+        let says = match self.rejects {
+            Some("play") => "rejects play: the output gives way as contact of curved bodies does (Hertz)",
+            Some(_) => "rejects contact of curved bodies (Hertz): the output has play",
+            None => "does not tell play from contact of curved bodies (Hertz)",
+        };
+        write!(
+            f,
+            "the generator stands and the load goes round, {rows} rows: no table, but what the output gives way by\n  \
+             half the play, c0: {c0_arcsec:.1} arcsec, crossed at ±{knee_n_m:.2} N.m\n  power of the load beside it: \
+             {exponent:.2}\n  half the loop at no load, the play aside: {loss_arcsec:.1} arcsec\nthe loop {says}"
+        )
+    }
+}
+
+struct Row {
+    log: usize,
+    x: f64,
+    way: f64,
+    flank: f64,
+    error_arcsec: f64,
+}
+
+impl Row {
+    fn power(&self, p: f64) -> f64 {
+        self.x.abs().powf(p).copysign(self.x)
+    }
+
+    fn loss(&self) -> f64 {
+        self.way * (1.0 - self.x * self.x)
+    }
+}
+
+/// Three columns beside the zeros of the logs.
+type Columns<'a> = &'a dyn Fn(&Row) -> [f64; 3];
+
+/// Coefficients of the columns over the rows outside of a block, and the squares that they leave there and in each
+/// block.
+fn fit(rows: &[Row], columns: Columns<'_>, without: Option<usize>) -> Option<([f64; 3], f64, Vec<f64>)> {
+    let block = |k: usize| k * BLOCKS / rows.len();
+    let logs = rows.last()?.log + 1;
+    let normal = Normal::of(logs + 3, rows.len(), |k, row| {
+        row[..logs].fill(0.0);
+        row[rows[k].log] = 1.0;
+        row[logs..].copy_from_slice(&columns(&rows[k]));
+        (rows[k].error_arcsec, if without == Some(block(k)) { 0.0 } else { 1.0 })
+    })?;
+    let found = normal.values();
+    let mut left = vec![0.0; BLOCKS];
+    for (k, row) in rows.iter().enumerate() {
+        let says: f64 = columns(row).iter().zip(&found[logs..]).map(|(x, c)| x * c).sum();
+        left[block(k)] += (row.error_arcsec - found[row.log] - says).powi(2);
+    }
+    Some((std::array::from_fn(|k| found[logs + k]), normal.misfit(), left))
+}
+
+/// The rows of logs in which the generator stands and the load goes round; none if one does otherwise.
+fn rows_of(files: &[Recording]) -> Option<(Vec<Row>, f64)> {
+    let sessions = || files.iter().flat_map(|file| &file.sessions);
+    let loads = sessions().map(|session| session.torque_n_m.as_deref()).collect::<Option<Vec<_>>>()?;
+    let (low, high) = least_and_most(loads.iter().flat_map(|loads| loads.iter().copied()));
+    let (most, noise) = (high.max(-low), white_noise(loads.iter().copied()));
+    let stands = sessions().all(|session| {
+        let (from, to) = least_and_most(session.generator_rad.iter().copied());
+        to - from < STANDS_RAD
+    });
+    if !stands || high.min(-low) < BOTH_ENDS * most || most <= 0.0 {
+        return None;
+    }
+    let (mut rows, mut turns) = (Vec::new(), 0);
+    for (log, (session, loads)) in sessions().zip(loads).enumerate() {
+        let (mut way, mut end, mut is_known) = (1.0, f64::NEG_INFINITY, false);
+        for (load, error_rad) in loads.iter().zip(&session.error_rad) {
+            if way * (end - load) > (COMES_BACK * most).max(BEYOND_NOISE * noise) {
+                (way, end, turns) = (-way, *load, turns + 1);
+            }
+            end = if way > 0.0 { end.max(*load) } else { end.min(*load) };
+            let x = load / most;
+            // Before the first knee nobody knows the flank.
+            is_known |= x.abs() > KNEES[1];
+            if is_known {
+                rows.push(Row { log, x, way, flank: 0.0, error_arcsec: error_rad * ARCSEC_PER_RAD });
+            }
+        }
+    }
+    (turns >= 2 && rows.len() >= super::FEWEST_ROWS).then_some((rows, most))
+}
+
+/// Puts rows on the flank that a load beyond the knee has brought them to.
+fn turn_over(rows: &mut [Row], knee: f64) {
+    let mut flank = 0.0;
+    for row in rows {
+        flank = if row.x.abs() > knee { row.x.signum() } else { flank };
+        row.flank = flank;
+    }
+}
+
+impl TorqueLoop {
+    /// Of logs in which the generator stands and the load goes round; none of others.
+    #[must_use]
+    pub fn of(files: &[Recording]) -> Option<TorqueLoop> {
+        let (mut rows, most_n_m) = rows_of(files)?;
+        let ([mut from, mut to], mut best) = (KNEES, (f64::INFINITY, 0.0));
+        for _ in 0..KNEES_NARROWED {
+            let step = (to - from) / KNEES_TRIED as f64;
+            for knee in (0..=KNEES_TRIED).map(|k| from + step * k as f64) {
+                turn_over(&mut rows, knee);
+                let (_, left, _) = fit(&rows, &|row| [row.x, row.flank, row.loss()], None)?;
+                best = if left < best.0 { (left, knee) } else { best };
+            }
+            [from, to] = [(best.1 - step).max(0.0), best.1 + step];
+        }
+        let knee = best.1;
+        turn_over(&mut rows, knee);
+        let (_, of_play, by_play) = fit(&rows, &|row| [row.x, row.flank, row.loss()], None)?;
+        let (_, of_hertz, by_hertz) = fit(&rows, &|row| [row.x, row.power(HERTZ), row.loss()], None)?;
+        let apart = of_play - of_hertz;
+        let without: Vec<f64> = by_play.iter().zip(&by_hertz).map(|(play, hertz)| apart - (play - hertz)).collect();
+        let told = apart.abs() > OF_95 * jackknife(&without);
+        // c0, exponent and loss, of all rows or without a block.
+        let found = |without: Option<usize>| -> Option<[f64; 3]> {
+            let with = |p: f64| fit(&rows, &move |row| [row.flank, row.power(p), row.loss()], without);
+            let [mut low, mut high] = POWERS;
+            while high - low > 1e-4 {
+                let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+                if with(a)?.1 < with(b)?.1 { high = b } else { low = a }
+            }
+            let ([c0, _, loss], ..) = with(low)?;
+            Some([c0, low, loss])
+        };
+        let value = found(None)?;
+        let each = (0..BLOCKS).map(|block| found(Some(block))).collect::<Option<Vec<_>>>()?;
+        let figure = |k: usize| {
+            let without: Vec<f64> = each.iter().map(|found| found[k]).collect();
+            Told { value: value[k], half_width: OF_95 * jackknife(&without) }
+        };
+        Some(TorqueLoop {
+            rows: rows.len(),
+            most_n_m,
+            c0_arcsec: figure(0),
+            knee_n_m: knee * most_n_m,
+            exponent: figure(1),
+            loss_arcsec: Told { value: -figure(2).value, ..figure(2) },
+            rejects: told.then_some(if apart > 0.0 { "play" } else { "hertz" }),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Session;
+
+    /// Loops of both kinds by laws of their own: a spring that hardens or softens, a slip spring that loses, noise of
+    /// angle and torque, the load a sine or a triangle.
+    fn made(seed: u64, has_play: bool) -> Recording {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut between = |low: f64, high: f64| low + (high - low) * random.f64();
+        let (most, periods, spring) = (between(10.0, 60.0), between(1.6, 4.0), between(60.0, 150.0));
+        let (gives, knee, hardens) = (between(20.0, 60.0), between(0.002, 0.1), between(-0.05, 0.05));
+        let (loss, slips, triangle) = (between(0.0, 15.0), between(0.1, 0.6), between(0.0, 1.0) < 0.5);
+        let mut noise = |size: f64| size * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+        let (mut flank, mut held) = (-1.0, 0.0_f64);
+        let mut session = Session { torque_n_m: Some(Vec::new()), ..Session::default() };
+        let mut before = 0.0;
+        for k in 0..2000 {
+            let phase = periods * f64::from(k) / 2000.0;
+            let x = if triangle {
+                1.0 - 4.0 * ((phase + 0.25).rem_euclid(1.0) - 0.5).abs()
+            } else {
+                (std::f64::consts::TAU * phase).sin()
+            };
+            held = (held + x - before).clamp(-slips, slips);
+            before = x;
+            if x.abs() > knee {
+                flank = x.signum();
+            }
+            let beyond = if has_play { flank } else { x.abs().powf(2.0 / 3.0).copysign(x) };
+            let error = spring * (x + hardens * x * x * x) + gives * beyond - loss * held / slips;
+            session.line.push(k as u64);
+            session.generator_rad.push(1.0 + noise(1e-5));
+            session.error_rad.push((error + noise(2.0)) / ARCSEC_PER_RAD);
+            session.torque_n_m.as_mut().unwrap().push(most * (x + noise(0.001)));
+        }
+        Recording::made("loop.log", vec![session])
+    }
+
+    #[test]
+    fn play_and_hertz_are_told_apart_in_twenty_of_twenty() {
+        for seed in 0..10 {
+            for (has_play, other) in [(true, "hertz"), (false, "play")] {
+                let found = TorqueLoop::of(&[made(seed, has_play)]).unwrap();
+                println!("{seed} {found:?}");
+                assert_eq!(found.rejects, Some(other), "{seed}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_log_in_motion_is_no_loop_at_rest() {
+        let mut log = made(1, true);
+        log.sessions[0].generator_rad.iter_mut().enumerate().for_each(|(k, psi)| *psi += 1e-4 * k as f64);
+        assert_eq!(TorqueLoop::of(&[log]), None);
+    }
+}
