@@ -44,8 +44,8 @@ impl TurnsOff {
         let off = format!("{}{}", if *turns > 0 { "-" } else { "+" }, turns.abs());
         format!(
             "the motor's zero is off by whole turns: the generator angle reads {} turns {ahead} than that of the \
-             table{likely}; without these turns the residual is {left:.1} arcsec rms. Home the motor in the turn of the \
-             table, or take them off: --columns generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
+             table{likely}; without these turns the residual is {left:.1} arcsec rms. Home the motor in the turn of \
+             the table, or take them off: --columns generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
             turns.abs(),
             -std::f64::consts::TAU * *turns as f64
         )

@@ -28,6 +28,9 @@ use flexspline_report::calibration_report;
 /// the prediction of files or blocks that were left out of the fit. Writes calibrated.fxt, .h and .rs,
 /// calibration.json and report.html.
 ///
+/// Of a log in which the generator stands and the load goes round it makes no table, but says by how much the output
+/// gives way by play, and whether the loop rejects play or contact of curved bodies (Hertz): torque_loop.json.
+///
 /// --plan reports what to record before there is a log: the most informative passes of the bench in the time available,
 /// with the accuracy to expect. It writes plan.csv and plan.json.
 #[derive(Debug, Args)]

@@ -33,7 +33,7 @@ use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
 use crate::misfit::LEAVES;
-pub use at_rest::{Told, TorqueLoop};
+pub use at_rest::{LoopFigure, TorqueLoop};
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};

@@ -116,8 +116,8 @@ impl CellAt<'_> {
 }
 
 impl CellTangent {
-    /// Reduces a cell to its contribution; false where it is not stiff. `contact` adds what touches the bore to the lower
-    /// triangle of the matrix of bore and faces (of the given order) and says whether it did.
+    /// Reduces a cell to its contribution; false where it is not stiff. `contact` adds what touches the bore to the
+    /// lower triangle of the matrix of bore and faces (of the given order) and says whether it did.
     pub fn reduce(
         &mut self,
         kernels: DenseKernels,

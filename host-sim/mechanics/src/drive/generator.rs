@@ -21,9 +21,9 @@ use std::f64::consts::TAU;
 
 /// A Newton step, rad, below which the next one is below round-off: convergence is quadratic, with a factor near one.
 const LAST_STEP: f64 = 1e-8;
-/// Turns, rad, whose sine and cosine are those of a short series.
+/// Turns, rad, whose sine and cosine are those of a short series, exact to round-off.
 const SMALL: f64 = 5e-3;
-/// Points whose feet are looked for together: a vector of the widest unit.
+/// Points whose feet are looked for together: a vector of the widest unit there is. *Guess*.
 const LANES: usize = 8;
 
 /// A wave generator in its own frame (major axis along +x).
