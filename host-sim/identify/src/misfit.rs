@@ -45,7 +45,7 @@ impl TurnsOff {
         format!(
             "the motor's zero is off by whole turns: the generator angle reads {} turns {ahead} than that of the \
              table{likely}; without these turns the residual is {left:.1} arcsec rms. Home the motor in the turn of \
-             the table, or take them off: --columns generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
+             the table, or take them off: --columns generator=NAME:turn{off} (in its unit; in rad {:+.6})",
             turns.abs(),
             -std::f64::consts::TAU * *turns as f64
         )
