@@ -35,15 +35,18 @@ export class Painter {
     // Places and stresses of a sector and of its neighbour, by index as in `elements`.
     const [x, y, stress] = [0, 1, 2].map(() => new Float32Array(2 * nodeCount));
     const level = BUCKETS / this.colourEnd;
+    // Plain loops here: this runs for each element of each frame.
+    const fill = (k) => fills[Math.min(BUCKETS - 1, Math.max(0, k))];
     const add = (k, polygon) => {
-      const path = fills[Math.min(BUCKETS - 1, Math.max(0, k))];
-      polygon.forEach(([x, y], place) => path[place ? "lineTo" : "moveTo"](x, y));
-      path.closePath();
+      if (!polygon.length) return;
+      const path = fill(k);
+      path.moveTo(polygon[0][0], polygon[0][1]);
+      for (let place = 1; place < polygon.length; place++) path.lineTo(polygon[place][0], polygon[place][1]);
     };
     /** A triangle in bands of one colour: stress is linear within it. */
     const shade = (corners) => {
-      const levels = corners.map(([, , value]) => value);
-      const [low, high] = [Math.floor(Math.min(...levels)), Math.floor(Math.max(...levels))];
+      const [a, b, c] = [corners[0][2], corners[1][2], corners[2][2]];
+      const [low, high] = [Math.floor(Math.min(a, b, c)), Math.floor(Math.max(a, b, c))];
       for (let k = low; k <= high; k++) {
         const above = k > low ? cut(corners, k, 1) : corners;
         add(k, k < high ? cut(above, k + 1, -1) : above);
@@ -54,9 +57,12 @@ export class Painter {
       for (let e = 0; e < elements.length; e += 8) {
         const n = elements.subarray(e, e + 8);
         if (!fine) {
-          const corners = Array.from(n.subarray(0, 4), (a) => [x[a], y[a], stress[a]]);
-          const mean = corners.reduce((sum, [, , value]) => sum + value / 4, 0);
-          add(Math.floor(mean * level), corners);
+          const [a, b, c, d] = [n[0], n[1], n[2], n[3]];
+          const path = fill(Math.floor(0.25 * level * (stress[a] + stress[b] + stress[c] + stress[d])));
+          path.moveTo(x[a], y[a]);
+          path.lineTo(x[b], y[b]);
+          path.lineTo(x[c], y[c]);
+          path.lineTo(x[d], y[d]);
           continue;
         }
         // In triangles about the middle, which the shape functions of the element give.
