@@ -26,7 +26,7 @@ const ROWS_OF_A_NAME: usize = 4;
 const EPOCH_S: std::ops::RangeInclusive<f64> = 1e9..=3e9;
 
 table! {
-    /// The separator of two fields, with its name and the byte between them, of blanks the tab that [`with_tabs`] puts
+    /// The separator of two fields, with its name and the byte between them, of blanks the tab that `with_tabs` puts
     /// in their place. Of several that fit the first is taken.
     #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
     pub enum Separator: (&'static str, u8) {
