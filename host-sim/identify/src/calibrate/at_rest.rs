@@ -3,9 +3,10 @@
 //! The generator stands, the load goes round, and the output errs by
 //!
 //! ```text
-//! zero of the log + c0 flank + a sign(x) |x|^p + loss way (1 - x^2)         x: load over the largest
+//! zero of the log + c0 flank + a sign(x) |x|^p + b way (1 - x^2) + c held + d x^3         x: load over the largest
 //! ```
 //!
+//! `way` is that of the load, `held` what a spring holds that slips; both make the loss, x^3 a spring that hardens.
 //! Play turns over to the other flank at a knee, the same both ways, and stays there as the load comes back: a loop.
 //! Contact of curved bodies (Hertz) goes with the power ⅔ of the load and leaves none. Both are laid beside a spring
 //! and a loss, and the one that leaves more than the other is rejected.
@@ -114,28 +115,36 @@ impl Row {
     }
 }
 
-/// Coefficients of columns in addition to the zeros of the logs, over the rows outside of a block, and the squares
-/// that they leave there and in each block.
+/// Coefficients of columns in addition to the zeros of the logs, over the rows outside of a block: columns, then zeros;
+/// and the squares that they leave there.
 fn fit<const N: usize>(
     rows: &[Row],
     columns: impl Fn(&Row) -> [f64; N],
     without: Option<usize>,
-) -> Option<([f64; N], f64, Vec<f64>)> {
-    let block = |k: usize| k * BLOCKS / rows.len();
-    let logs = rows.last()?.log + 1;
-    let normal = Normal::of(logs + N, rows.len(), |k, row| {
-        row[..logs].fill(0.0);
-        row[rows[k].log] = 1.0;
-        row[logs..].copy_from_slice(&columns(&rows[k]));
-        (rows[k].error_arcsec, if without == Some(block(k)) { 0.0 } else { 1.0 })
+) -> Option<(Vec<f64>, f64)> {
+    let normal = Normal::of(N + rows.last()?.log + 1, rows.len(), |k, row| {
+        row[N..].fill(0.0);
+        row[N + rows[k].log] = 1.0;
+        row[..N].copy_from_slice(&columns(&rows[k]));
+        (rows[k].error_arcsec, if without == Some(block(k, rows)) { 0.0 } else { 1.0 })
     })?;
-    let found = normal.values();
-    let mut left = vec![0.0; BLOCKS];
+    Some((normal.values(), normal.misfit()))
+}
+
+/// The block of a row.
+fn block(k: usize, rows: &[Row]) -> usize {
+    k * BLOCKS / rows.len()
+}
+
+/// The squares that columns leave of all rows, and those of each block.
+fn left_by_block<const N: usize>(rows: &[Row], columns: impl Fn(&Row) -> [f64; N]) -> Option<(f64, [f64; BLOCKS])> {
+    let (found, all) = fit(rows, &columns, None)?;
+    let mut left = [0.0; BLOCKS];
     for (k, row) in rows.iter().enumerate() {
-        let says: f64 = columns(row).iter().zip(&found[logs..]).map(|(x, c)| x * c).sum();
-        left[block(k)] += (row.error_arcsec - found[row.log] - says).powi(2);
+        let says: f64 = columns(row).iter().zip(&found).map(|(x, c)| x * c).sum();
+        left[block(k, rows)] += (row.error_arcsec - found[N + row.log] - says).powi(2);
     }
-    Some((std::array::from_fn(|k| found[logs + k]), normal.misfit(), left))
+    Some((all, left))
 }
 
 /// The rows of logs in which the generator stands and the load goes round; none if one does otherwise.
@@ -192,18 +201,17 @@ impl TorqueLoop {
             let step = (to - from) / KNEES_TRIED as f64;
             for knee in (0..=KNEES_TRIED).map(|k| from + step * k as f64) {
                 turn_over(&mut rows, knee);
-                let (_, left, _) = fit(&rows, |row| [row.x, row.flank, row.loss()], None)?;
+                let (_, left) = fit(&rows, |row| [row.x, row.flank, row.loss()], None)?;
                 best = if left < best.0 { (left, knee) } else { best };
             }
             [from, to] = [(best.1 - step).max(0.0), best.1 + step];
         }
-        let knee = best.1;
+        let (_, knee) = best;
         turn_over(&mut rows, knee);
-        let (_, of_play, by_play) = fit(&rows, |row| [row.x, row.flank, row.loss()], None)?;
-        let (_, of_hertz, by_hertz) = fit(&rows, |row| [row.x, row.power(HERTZ), row.loss()], None)?;
+        let (of_play, by_play) = left_by_block(&rows, |row| [row.x, row.flank, row.loss()])?;
+        let (of_hertz, by_hertz) = left_by_block(&rows, |row| [row.x, row.power(HERTZ), row.loss()])?;
         let apart = of_play - of_hertz;
         let without: Vec<f64> = by_play.iter().zip(&by_hertz).map(|(play, hertz)| apart - (play - hertz)).collect();
-        let told = apart.abs() > OF_95 * jackknife(&without);
         // c0, exponent and loss, of all rows or without a block, beside springs that harden and that slip.
         let found = |without: Option<usize>| -> Option<[f64; 3]> {
             let with =
@@ -213,8 +221,9 @@ impl TorqueLoop {
                 let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
                 if with(a)?.1 < with(b)?.1 { high = b } else { low = a }
             }
-            let ([c0, _, loss, held, _], ..) = with(low)?;
-            Some([c0, low, -loss - SLIPS * held])
+            let (of, _) = with(low)?;
+            // Flank, power, loss, what the spring holds.
+            Some([of[0], low, -of[2] - SLIPS * of[3]])
         };
         let value = found(None)?;
         // Half of the play by other laws: Hertz's power beside a spring, and no springs at all.
@@ -235,7 +244,7 @@ impl TorqueLoop {
             knee_n_m: knee * most_n_m,
             exponent: figure(1),
             loss_arcsec: figure(2),
-            rejects: told.then_some(if apart > 0.0 { "play" } else { "hertz" }),
+            rejects: (apart.abs() > OF_95 * jackknife(&without)).then_some(if apart > 0.0 { "play" } else { "hertz" }),
         })
     }
 }
