@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Pages and examples as an archive of a release has them: pages.py VERSION TARGET GLIBC FOLDER, from the top of the project
+"""Pages and examples as an archive of a release has them: pages.py VERSION TARGET FOLDER, from the top of the project
 
 Whoever has the archive has no source: `cargo run --release --` becomes the command, a link to what is not in the archive becomes the name of
 the file in the source archive, and a line of the list of pages whose page is not there goes. Fails where a link still leads nowhere.
@@ -64,7 +64,7 @@ def dead_links(folder):
                         yield f"{page}: {found.group(3)}"
 
 
-def main(version, target, glibc, folder):
+def main(version, target, folder):
     tracked = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=True).stdout.split("\n")
     files = [path for path in tracked if shipped(path)]
     there = {*files, "README.md"}
@@ -77,7 +77,7 @@ def main(version, target, glibc, folder):
         else:
             shutil.copy(path, to)
     with open("tests/release/README.in", encoding="utf-8") as page, open(os.path.join(folder, "README.md"), "w", encoding="utf-8") as made:
-        made.write(page.read().replace("@VERSION@", version).replace("@TARGET@", target).replace("@GLIBC@", glibc))
+        made.write(page.read().replace("@VERSION@", version).replace("@TARGET@", target))
     dead = list(dead_links(folder))
     for link in dead:
         print(f"{folder}: dead link in {link}", file=sys.stderr)

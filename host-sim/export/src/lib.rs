@@ -6,6 +6,7 @@ pub mod fmu;
 mod inp;
 mod outlines;
 pub mod playback;
+mod shipped;
 mod vtu;
 mod vtu_whole;
 

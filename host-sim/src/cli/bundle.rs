@@ -36,8 +36,7 @@ pub(super) struct BundleCommand {
     /// No static libraries, only the reader in C99
     #[arg(long, conflicts_with_all = ["targets", "libraries"])]
     no_core: bool,
-    /// Folder with TARGET/libflexspline.a; default: the one of the release next to this program, or a build of these
-    /// sources
+    /// Folder with TARGET/libflexspline.a; default: those in a program that was released, or a build of these sources
     #[arg(long, value_name = "DIR")]
     libraries: Option<PathBuf>,
     /// Also write the folder as one file, DIR.tar.gz

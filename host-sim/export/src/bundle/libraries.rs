@@ -6,6 +6,8 @@ use std::process::{Command, Stdio};
 
 use thiserror::Error;
 
+use crate::shipped::shipped;
+
 /// The C interface of the libraries.
 pub(crate) const HEADER: &str = include_str!("../../shipped/flexspline.h");
 
@@ -63,49 +65,50 @@ pub enum LibraryError {
 
 /// Where libraries are looked for.
 #[derive(Debug)]
-pub struct Places {
-    /// Folders that hold `<target>/libflexspline.a`; the first that has it counts.
-    folders: Vec<PathBuf>,
-    /// A checkout of the sources.
-    checkout: Option<PathBuf>,
+pub enum Places {
+    /// A folder that was named: it holds `<target>/libflexspline.a`.
+    Named(PathBuf),
+    /// In this program, if it was released, or built from the checkout around the current folder, if there is one.
+    Own(Option<PathBuf>),
 }
 
 impl Places {
-    /// A folder that was named; or that of a release, beside this program, and then the checkout around the current
-    /// folder.
+    /// A folder that was named, or what this program has.
     #[must_use]
     pub fn new(named: Option<&Path>) -> Places {
-        if let Some(named) = named {
-            return Places { folders: vec![named.to_owned()], checkout: None };
-        }
-        let program = std::env::current_exe().ok();
-        let release = program.as_deref().and_then(Path::parent).map(|folder| folder.join("../share/flexspline/lib"));
         let here = std::env::current_dir().unwrap_or_default();
-        let checkout = here.ancestors().find(|folder| is_checkout(folder)).map(Path::to_owned);
-        Places { folders: release.into_iter().collect(), checkout }
+        let checkout = || here.ancestors().find(|folder| is_checkout(folder)).map(Path::to_owned);
+        named.map_or_else(|| Places::Own(checkout()), |named| Places::Named(named.to_owned()))
     }
 
-    /// The library of a target that lies somewhere; `None` if it would have to be built.
+    /// The library of a target that is at hand; `None` if it would have to be built.
     ///
     /// # Errors
-    /// It lies there and is none; it cannot be had at all.
+    /// It is at hand and is none; it cannot be had at all.
     pub fn find(&self, target: &str) -> Result<Option<BundleLibrary>, LibraryError> {
-        let found = self.folders.iter().map(|folder| folder.join(target).join(ARCHIVE)).find(|path| path.exists());
-        if let Some(path) = found {
-            return read(target, &path).map(Some);
+        if let Places::Named(folder) = self {
+            let path = folder.join(target).join(ARCHIVE);
+            if path.exists() {
+                return read(target, &path).map(Some);
+            }
+        } else if let Some(archive) = shipped(&format!("{target}.a")) {
+            return Ok(Some(BundleLibrary { target: target.to_owned(), archive: archive.to_vec() }));
         }
-        self.can_build(target).map(|()| None)
+        self.can_build(target).map(|_| None)
     }
 
-    /// Whether cargo is there and has the target.
-    fn can_build(&self, target: &str) -> Result<(), LibraryError> {
+    /// The checkout, if cargo is there and has the target.
+    fn can_build(&self, target: &str) -> Result<&Path, LibraryError> {
         let missing = |why: String| LibraryError::Missing { target: target.to_owned(), why };
-        let Some(checkout) = &self.checkout else {
-            let looked = self.folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ");
-            return Err(missing(format!(
-                "no {target}/{ARCHIVE} in {looked}, and no checkout of the sources here to build it; a release has \
-                 the libraries, --libraries names another folder"
-            )));
+        let checkout = match self {
+            Places::Named(folder) => return Err(missing(format!("no {target}/{ARCHIVE} in {}", folder.display()))),
+            Places::Own(checkout) => checkout.as_deref().ok_or_else(|| {
+                missing(
+                    "not in this program, and no checkout of the sources here to build it; a release has the \
+                     libraries, --libraries names a folder of them"
+                        .to_owned(),
+                )
+            })?,
         };
         let header = fs::read_to_string(checkout.join("core/include/flexspline.h")).unwrap_or_default();
         if header != HEADER {
@@ -125,7 +128,7 @@ impl Places {
         };
         let installed = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
         if installed {
-            Ok(())
+            Ok(checkout)
         } else {
             Err(missing(format!("the Rust target is not installed: rustup target add {target}")))
         }
@@ -136,8 +139,7 @@ impl Places {
     /// # Errors
     /// Output of cargo.
     pub fn build(&self, target: &str) -> Result<BundleLibrary, LibraryError> {
-        self.can_build(target)?;
-        let checkout = self.checkout.as_deref().unwrap_or(Path::new("."));
+        let checkout = self.can_build(target)?;
         let folder =
             std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| checkout.join("target"), PathBuf::from).join("bundle");
         let folder = std::path::absolute(&folder).unwrap_or(folder);

@@ -1,6 +1,5 @@
 //! Why there is no FMU.
 
-use std::io;
 use std::path::PathBuf;
 
 use flexspline::ImageError;
@@ -44,17 +43,11 @@ pub enum FmuExportError {
     },
     /// No library was found.
     #[error(
-        "found no library for an FMU; looked for {}. In a checkout run: cargo build --release -p flexspline-fmu, and \
-         give --library target/release/{built}",
-        looked.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
+        "found no library for an FMU in this program or beside it. In a checkout run: cargo build --release -p \
+         flexspline-fmu, and give --library target/release/{built}"
     )]
     Missing {
-        /// Where it was looked for.
-        looked: Vec<PathBuf>,
         /// The file that a build makes.
         built: &'static str,
     },
-    /// Where this program lies is not known.
-    #[error("this program: {0}")]
-    Program(#[source] io::Error),
 }

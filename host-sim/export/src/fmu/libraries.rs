@@ -1,9 +1,10 @@
-//! The libraries that go into an FMU: named, beside the program, or where a release or cargo puts them.
+//! The libraries that go into an FMU: named, in a program that was released, or where cargo puts them.
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use super::FmuExportError;
+use crate::shipped::shipped;
 
 /// A platform (section 2.3): its folder, name and ending of its library, and the first bytes of such a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,8 +60,8 @@ pub struct Library {
     pub bytes: Vec<u8>,
 }
 
-/// The libraries of these files, one for each platform; without any, those that lie where a build or a release has
-/// them.
+/// The libraries of these files, one for each platform; without any, those in a program that was
+/// released, or where a build has them.
 ///
 /// # Errors
 /// A file that is none, or what to do where there is none at all.
@@ -77,30 +78,26 @@ pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, FmuExportError>
     if !named.is_empty() {
         return Ok(libraries);
     }
-    let program = std::env::current_exe().and_then(fs::canonicalize).map_err(FmuExportError::Program)?;
+    let program = std::env::current_exe().and_then(fs::canonicalize).unwrap_or_default();
     let beside = program.parent().unwrap_or(Path::new("."));
     for platform in &PLATFORMS {
+        let in_program =
+            shipped(platform.file).and_then(|bytes| checked(Path::new(platform.file), bytes.to_vec()).ok());
         // One that does not fit is left out: it is of an earlier build.
-        let found =
-            places(beside, platform).into_iter().filter(|file| file.is_file()).find_map(|file| read(&file).ok());
-        libraries.extend(found);
+        let of_build = || places(beside, platform).into_iter().find_map(|file| read(&file).ok());
+        libraries.extend(in_program.or_else(of_build));
     }
     if libraries.is_empty() {
-        return Err(FmuExportError::Missing { looked: places(beside, &PLATFORMS[0]), built: PLATFORMS[0].file });
+        return Err(FmuExportError::Missing { built: PLATFORMS[0].file });
     }
     Ok(libraries)
 }
 
-/// Where the library of a platform may lie, the likeliest to be new first.
+/// Where a build has the library of a platform, the likeliest to be new first.
 fn places(beside: &Path, platform: &Platform) -> Vec<PathBuf> {
-    let Platform { folder, file, target, .. } = platform;
-    let mut places = vec![
-        // Cargo has there what it built along with the program.
-        beside.join("deps").join(file),
-        beside.join(file),
-        // A release.
-        beside.join("../share/flexspline/fmu").join(folder).join(file),
-    ];
+    let Platform { file, target, .. } = platform;
+    // Cargo has in `deps` what it built along with the program.
+    let mut places = vec![beside.join("deps").join(file), beside.join(file)];
     // Cargo's folder of another target.
     if let (Some(profile), Some(targets)) = (beside.file_name(), beside.parent()) {
         places.push(targets.join(target).join(profile).join(file));
@@ -110,8 +107,13 @@ fn places(beside: &Path, platform: &Platform) -> Vec<PathBuf> {
 }
 
 fn read(file: &Path) -> Result<Library, FmuExportError> {
+    let refuse = |error: io::Error| FmuExportError::NoLibrary { file: file.to_owned(), why: error.to_string() };
+    checked(file, fs::read(file).map_err(refuse)?)
+}
+
+/// A library of a platform, if these are the bytes of one.
+fn checked(file: &Path, bytes: Vec<u8>) -> Result<Library, FmuExportError> {
     let refuse = |why: &str| FmuExportError::NoLibrary { file: file.to_owned(), why: why.to_owned() };
-    let bytes = fs::read(file).map_err(|error| refuse(&error.to_string()))?;
     let platform = PLATFORMS.iter().find(|platform| bytes.starts_with(platform.magic));
     let platform = platform.ok_or_else(|| refuse("no library of Linux, Windows or macOS with 64 bits"))?;
     let (at, machine) = ELF_MACHINE;
