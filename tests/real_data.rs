@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use flexspline_base::robust::white_noise;
 use flexspline_identify::diagnosis::rows::Rows;
-use flexspline_identify::measurement::{ColumnMap, Gear, Session, parse, read};
+use flexspline_identify::measurement::{ColumnMap, Gear, Session, bytes_of, parse};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::{Axis, Picture, harmonics};
 use flexspline_tests::command::Desk;
@@ -17,7 +17,7 @@ const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
 fn csf17() -> Session {
     let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../examples/csf17_100/error_vs_input.csv");
     let map = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec").unwrap();
-    let mut recording = read(&file, &map, &Gear::of_teeth(200, 202, true)).unwrap();
+    let mut recording = parse("gear.csv", bytes_of(&file).unwrap().1, &map, &Gear::of_teeth(200, 202, true)).unwrap();
     assert_eq!(recording.faults, [], "a clean measurement");
     assert_eq!((recording.rows, recording.sessions.len()), (431, 1));
     recording.sessions.remove(0)

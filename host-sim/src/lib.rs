@@ -4,7 +4,7 @@
 //! drive.toml -> Drive -> Problem -> Motion -> make_tables -> image (.fxt), read by the crate `flexspline`
 //!                                     |
 //!                        simulate, make_kernels, sweep, reproduce, fly
-//! measured.csv -> read_log -> Picture, calibrate, diagnose -> Model -> drive and tables, extended
+//! measured.csv -> parse_log -> Picture, calibrate, diagnose -> Model -> drive and tables, extended
 //! ```
 //!
 //! Each name is here once, by what one wants to do; the crates behind them (`flexspline-mechanics`, `-design`,
@@ -78,7 +78,7 @@
 //! ```
 //! use flexspline_sim::{look, raw};
 //!
-//! let looked = look(&[raw::parse("joint3.csv", &std::fs::read("../examples/lara8/joint3.csv")?[..])?])?;
+//! let looked = look(&[raw::parse("joint3.csv", &std::fs::read("../examples/lara8/joint3.csv")?)?])?;
 //! assert_eq!(looked.ratio_proposed, Some(101.0));
 //! assert!(looked.columns_option.unwrap().contains("generator=encoder_motorinc_3"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -88,11 +88,11 @@
 //!
 //! ```
 //! use flexspline_sim::{Gear, Nominal, Picture, Rows};
-//! # use flexspline_sim::{ColumnMap, read_log};
+//! # use flexspline_sim::{ColumnMap, parse_log};
 //! # let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! # let file = "../examples/csf17_100/error_vs_input.csv";
 //!
-//! let log = read_log(file.as_ref(), &columns, &Gear::of_ratio(100.0))?;
+//! let log = parse_log(file, &std::fs::read(file)?, &columns, &Gear::of_ratio(100.0))?;
 //! let model = "../examples/csf17_100/nominal.toml";
 //! let nominal = Nominal::from_toml(model, &std::fs::read_to_string(model)?)?;
 //! let rows = Rows::new(&log.sessions, &nominal);
@@ -106,11 +106,11 @@
 //! # Calibrate one unit
 //!
 //! ```
-//! use flexspline_sim::{ColumnMap, Gear, GeneratorKind, Prior, calibrate, read_log};
+//! use flexspline_sim::{ColumnMap, Gear, GeneratorKind, Prior, calibrate, parse_log};
 //!
 //! let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! let file = "../examples/csf17_100/error_vs_input.csv";
-//! let log = read_log(file.as_ref(), &columns, &Gear::of_ratio(100.0))?;
+//! let log = parse_log(file, &std::fs::read(file)?, &columns, &Gear::of_ratio(100.0))?;
 //! let made = calibrate(&[log], &Prior::of_ratio(100.0, GeneratorKind::Cam))?;
 //! assert!(made.calibration.core.rms_after_arcsec < 0.4 * made.calibration.core.rms_before_arcsec);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -119,12 +119,13 @@
 //! # Name what the simulation gets wrong
 //!
 //! ```
-//! use flexspline_sim::{ColumnMap, Drive, GeneratorKind, Model, Options, Subject, diagnose, read_rows};
+//! use flexspline_sim::{ColumnMap, Drive, GeneratorKind, Model, Options, Subject, diagnose, parse_rows};
 //!
 //! let model = Model::read("../examples/csf17_100/nominal.toml".as_ref())?;
 //! let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
 //! let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
-//! let rows = read_rows("../examples/csf17_100/error_vs_input.csv".as_ref(), &columns, &subject)?;
+//! let log = std::fs::read("../examples/csf17_100/error_vs_input.csv")?;
+//! let rows = parse_rows("error_vs_input.csv", &log, &columns, &subject)?;
 //! let diagnosed = diagnose(rows, &subject, &Options::default(), |_, _, _| ())?;
 //! // 2.5 turns of the generator cannot say which wheel it is.
 //! assert!(diagnosed.diagnosis.causes.is_empty());
@@ -194,7 +195,7 @@ pub use flexspline_design::tables::{
 pub use flexspline_identify::diagnosis::rows::Rows;
 pub use flexspline_identify::look::{Looked, look};
 pub use flexspline_identify::measurement::{
-    ColumnMap, Fault, Gear, MappingError, MeasuredError, Recording, Session, parse as parse_log, raw, read as read_log,
+    ColumnMap, Fault, Gear, MappingError, MeasuredError, Recording, Session, parse as parse_log, raw,
 };
 pub use flexspline_identify::residual::Picture;
 
@@ -203,7 +204,6 @@ pub use flexspline_identify::calibrate::{Calibrated, Calibration, CalibrationErr
 pub use flexspline_identify::causes::CauseName;
 pub use flexspline_identify::diagnosis::{
     Diagnosed, Diagnosis, Explanation, Options, PipelineError, Subject, diagnose_rows as diagnose, parse_rows,
-    read_rows,
 };
 pub use flexspline_identify::extension::{Model, left_by_core};
 pub use flexspline_identify::replay::{MeasuredRow, ReplaySummary, ReplayedRow, replay};

@@ -2,14 +2,13 @@
 //! of angles in degrees, which no ratio shows.
 
 use std::f64::consts::TAU;
-use std::path::Path;
 
 use flexspline::Table;
 
 use crate::diagnosis::channels::{check_degrees, check_torque};
 use crate::least_squares::Normal;
 use crate::measurement::{
-    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Quantity, Recording, Refusal, Session, bytes_of, least_and_most,
+    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Quantity, Recording, Refusal, Session, least_and_most,
     parse_at_least,
 };
 use crate::nominal::Nominal;
@@ -19,27 +18,14 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 /// Fewest rows that a table is played over. *Source*: one has no mean to be about.
 pub(crate) const FEW: usize = 2;
 
-/// Reads a file of rows of a drive with this model, and the table that takes its place where there is one.
-///
-/// # Errors
-/// It cannot be read.
-pub fn read_known(
-    path: &Path,
-    columns: &ColumnMap,
-    nominal: &Nominal,
-    table: Option<&Table<'_>>,
-) -> Result<Recording, MeasuredError> {
-    let (file, bytes) = bytes_of(path)?;
-    parse_known(&file, &bytes, columns, nominal, table)
-}
-
-/// The same of rows that stand in memory.
+/// Reads rows of a drive with this model, and the table that takes its place where there is one: `bytes` of a file
+/// called `file`.
 ///
 /// # Errors
 /// They cannot be read.
 pub fn parse_known(
     file: &str,
-    bytes: &[u8],
+    bytes: impl Into<Vec<u8>>,
     columns: &ColumnMap,
     nominal: &Nominal,
     table: Option<&Table<'_>>,

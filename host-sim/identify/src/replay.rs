@@ -237,7 +237,7 @@ pub struct RowsRead {
 /// They cannot be read, their torque is in another unit, or they are of another ratio.
 pub fn read(
     file: &str,
-    bytes: &[u8],
+    bytes: impl Into<Vec<u8>>,
     columns: &ColumnMap,
     table: &Table<'_>,
     temperature_c: f64,

@@ -19,7 +19,7 @@ mod native {
     #[pymodule_export]
     use super::drive::Drive;
     #[pymodule_export]
-    use super::measured::{calibrate, diagnose};
+    use super::measured::{calibrate, diagnose, look};
     #[pymodule_export]
     use super::simulate::simulate;
     #[pymodule_export]

@@ -1,5 +1,6 @@
 //! Measured data: to a table (`calibrate`), to a verdict (`diagnose`).
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use flexspline::Table;
@@ -7,12 +8,11 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
 use flexspline_identify::calibrate::{CalibrationError, Prior, calibrate as fit};
 use flexspline_identify::causes::CauseName;
-use flexspline_identify::diagnosis::{
-    Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows, read_rows,
-};
+use flexspline_identify::diagnosis::{Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows};
 use flexspline_identify::extension::Model;
-use flexspline_identify::known_rows::{parse_known, read_known};
-use flexspline_identify::measurement::{ColumnMap, Session};
+use flexspline_identify::known_rows::parse_known;
+use flexspline_identify::look::{look as look_at, text};
+use flexspline_identify::measurement::{ColumnMap, MeasuredError, Session, bytes_of, raw};
 use flexspline_mechanics::drive::Drive as MechanicsDrive;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
@@ -40,6 +40,23 @@ impl LogFrom {
             LogFrom::Memory((name, _)) => name.clone(),
         }
     }
+
+    /// Its name in messages, and its bytes.
+    fn bytes(&self) -> Result<(String, Cow<'_, [u8]>), MeasuredError> {
+        Ok(match self {
+            LogFrom::File(path) => bytes_of(path).map(|(name, bytes)| (name, Cow::Owned(bytes)))?,
+            LogFrom::Memory((name, bytes)) => (name.clone(), Cow::Borrowed(bytes)),
+        })
+    }
+}
+
+/// What is in logs: the text of the JSON of `flexspline look`, and what it prints.
+#[pyfunction]
+pub fn look(logs: Vec<LogFrom>) -> PyResult<(String, String)> {
+    let of_log = |log: &LogFrom| log.bytes().and_then(|(name, bytes)| raw::parse(&name, bytes));
+    let files = logs.iter().map(of_log).collect::<Result<Vec<_>, _>>().map_err(bad)?;
+    let looked = look_at(&files).map_err(bad)?;
+    Ok((serde_json::to_string(&looked).map_err(bad)?, text(&looked)))
 }
 
 /// How the columns of logs are read: mapping, rows in a second, torque of an ampere.
@@ -91,11 +108,9 @@ pub fn calibrate<'py>(
         };
         let one = |(k, log): (usize, &LogFrom)| {
             watch.tell_or_unwind(k, logs.len() + 1, format!("reading {}", log.name()));
-            match log {
-                LogFrom::File(path) => read_known(path, &map, &prior.nominal, prior.table),
-                LogFrom::Memory((name, bytes)) => parse_known(name, bytes, &map, &prior.nominal, prior.table),
-            }
-            .map_err(PythonFailure::bad)
+            let known =
+                |(name, bytes): (String, Cow<'_, [u8]>)| parse_known(&name, bytes, &map, &prior.nominal, prior.table);
+            log.bytes().and_then(known).map_err(PythonFailure::bad)
         };
         let mut files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, PythonFailure>>()?;
         let causes = extended.map_or(Ok(None), |subject| subject.known_before(&mut files));
@@ -166,10 +181,8 @@ pub fn diagnose<'py>(
             Some(path) => with_kernels(subject, path)?,
             None => subject,
         };
-        let recording = match &log {
-            LogFrom::File(path) => read_rows(path, &map, &subject),
-            LogFrom::Memory((name, bytes)) => parse_rows(name, bytes, &map, &subject),
-        };
+        let (name, bytes) = log.bytes().map_err(PythonFailure::bad)?;
+        let recording = parse_rows(&name, bytes, &map, &subject);
         let options = Options { asked, ..Options::default() };
         let tell = |done: usize, of: usize, what: &str| watch.tell_or_unwind(done, of, what.to_owned());
         let done = diagnose_rows(recording.map_err(failed)?, &subject, &options, tell).map_err(failed)?;

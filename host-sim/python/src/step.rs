@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use flexspline::{Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, Table as CoreTable};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{dead_zone_n_m, generator_of};
-use flexspline_identify::measurement::ColumnMap;
+use flexspline_identify::measurement::{ColumnMap, bytes_of};
 use flexspline_identify::replay::{MeasuredRow, RowsOf, RowsRead, read, replay};
 use flexspline_identify::wind_up::WindUpCurve;
 use flexspline_mechanics::drive::GeneratorKind;
@@ -378,8 +378,8 @@ impl Table {
         file: &str,
         temperature_c: f64,
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
-        let bytes = std::fs::read(file).map_err(|error| bad(format!("{file}: {error}")))?;
-        let read = read(file, &bytes, &ColumnMap::default(), self.table(), temperature_c, true).map_err(bad)?;
+        let (_, bytes) = bytes_of(std::path::Path::new(file)).map_err(bad)?;
+        let read = read(file, &bytes[..], &ColumnMap::default(), self.table(), temperature_c, true).map_err(bad)?;
         self.replayed(py, read, RowsOf::beside(std::path::Path::new(file), &bytes))
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import inspect
+import json
 import os
 import pickle
 import signal
@@ -152,6 +153,15 @@ def test_missing_values_and_times_are_taken_as_they_are(log_file: Path, tmp_path
     assert flexspline.diagnose(nullable, model=MODEL).json == of_file.json
 
 
+def test_look_is_the_command(log_file: Path) -> None:
+    assert flexspline.look(log_file).json == json.loads(command("look", log_file, "--json").stdout)
+    of_frame = flexspline.look([frame_of(log_file)])
+    assert of_frame.ratio_proposed == flexspline.look(log_file).ratio_proposed
+    assert "ratio" in repr(of_frame)
+    with pytest.raises(BadInput, match="found none"):
+        flexspline.look([])
+
+
 def test_calibrate_is_the_command(log_file: Path, tmp_path: Path) -> None:
     command("calibrate", log_file, "--model", MODEL, "--no-report", "--out", tmp_path)
     made = flexspline.calibrate(log_file, model=MODEL)
@@ -174,14 +184,14 @@ def test_calibrate_is_the_command(log_file: Path, tmp_path: Path) -> None:
 def test_a_calibrator_fits_predicts_and_scores(log_file: Path) -> None:
     frame = frame_of(log_file)
     calibrator = flexspline.Calibrator(model=MODEL)
-    with pytest.raises(flexspline.BadInput, match="not fitted yet"):
+    with pytest.raises(BadInput, match="not fitted yet"):
         calibrator.predict(frame)
     made = calibrator.fit(frame).calibration_
     replayed = made.table.replay(frame)
     unmeasured = frame.drop(columns="output_rad")
     np.testing.assert_allclose(calibrator.predict(unmeasured), replayed.predicted_arcsec, atol=1e-3)
     assert replayed.predicted_arcsec.std() > 1.0
-    with pytest.raises(flexspline.BadInput, match="generator_rad and one of"):
+    with pytest.raises(BadInput, match="generator_rad and one of"):
         calibrator.score(unmeasured)
     left = replayed.summary.rms_residual_arcsec / replayed.summary.rms_measured_arcsec
     assert calibrator.score(frame) == pytest.approx(1.0 - left**2, abs=1e-6)
@@ -198,7 +208,7 @@ def test_a_calibrator_is_an_estimator_of_scikit_learn(log_file: Path) -> None:
     twin = clone(calibrator)
     assert twin is not calibrator and twin.get_params() == {"model": MODEL}
     assert twin.set_params(threads=1).get_params() == {"model": MODEL, "threads": 1} and calibrator.get_params() == {"model": MODEL}
-    with pytest.raises(flexspline.BadInput, match="found ratios, allowed: ratio, model"):
+    with pytest.raises(BadInput, match="found ratios, allowed: ratio, model"):
         twin.set_params(ratios=101)
     scores = cross_val_score(calibrator, frame, cv=3)
     assert scores.shape == (3,) and (scores > 0.0).all()
@@ -215,10 +225,10 @@ def test_a_measurement_that_is_none_is_refused_and_never_scored(log_file: Path) 
         holed = holed if name == "output_rad" else holed.drop(columns="output_rad")
         holed.loc[100:110, name] = np.nan
         for run in (calibrator.score, calibrator.calibration_.table.replay):
-            with pytest.raises(flexspline.BadInput, match=rf"{name}\[100\]: found nan and in 10 other rows"):
+            with pytest.raises(BadInput, match=rf"{name}\[100\]: found nan and in 10 other rows"):
                 run(holed)
     assert np.isfinite(calibrator.score(frame))
-    with pytest.raises(flexspline.BadInput, match="the same error in every row"):
+    with pytest.raises(BadInput, match="the same error in every row"):
         calibrator.score(holed.dropna())
 
 

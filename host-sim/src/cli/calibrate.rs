@@ -17,7 +17,8 @@ use flexspline_identify::calibrate::{
 };
 use flexspline_identify::diagnosis::Subject;
 use flexspline_identify::extension::Model;
-use flexspline_identify::known_rows::read_known;
+use flexspline_identify::known_rows::parse_known;
+use flexspline_identify::measurement::bytes_of;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::calibration_report;
 
@@ -171,7 +172,10 @@ impl Calibrate {
         let files = self
             .logs
             .iter()
-            .map(|file| read_known(file, &map, &prior.nominal, prior.table))
+            .map(|file| {
+                let (file, bytes) = bytes_of(file)?;
+                parse_known(&file, bytes, &map, &prior.nominal, prior.table)
+            })
             .collect::<Result<Vec<_>, _>>();
         let mut files = files.map_err(bad_input)?;
         if let Some(found) = TorqueLoop::of(&files) {

@@ -14,11 +14,11 @@ use flexspline_design::kernels::Kernels;
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::pipeline::{
-    Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, read_rows,
+    Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, parse_rows,
 };
 use flexspline_identify::diagnosis::report::{Compensation, Diagnosis};
 use flexspline_identify::extension::{Compensated, Model};
-use flexspline_identify::measurement::Recording;
+use flexspline_identify::measurement::{Recording, bytes_of};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 
@@ -85,7 +85,8 @@ impl Diagnose {
         let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
         let subject = self.subject(context, image.as_ref())?;
         let failed = |error: PipelineError| self.failed(&error);
-        let recording = read_rows(&self.data, &map, &subject).map_err(failed)?;
+        let (file, bytes) = bytes_of(&self.data).map_err(bad_input)?;
+        let recording = parse_rows(&file, bytes, &map, &subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
         if !self.no_report {

@@ -7,7 +7,7 @@ use clap::Args;
 use super::context::{Context, quoted};
 use super::{Failure, bad_input, say};
 use flexspline_identify::look::{Looked, look, text};
-use flexspline_identify::measurement::raw;
+use flexspline_identify::measurement::{bytes_of, raw};
 
 /// Inspect log files of a bench: columns, units, ratio, torque, time, coverage; propose the mapping to read them with
 ///
@@ -27,7 +27,11 @@ pub(super) struct Look {
 impl Look {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         context.refuse_drive("logs say which drive they are of by their rows")?;
-        let files = self.files.iter().map(|file| raw::read(file)).collect::<Result<Vec<_>, _>>();
+        let files = self
+            .files
+            .iter()
+            .map(|file| bytes_of(file).and_then(|(file, bytes)| raw::parse(&file, bytes)))
+            .collect::<Result<Vec<_>, _>>();
         let files = files.map_err(bad_input)?;
         let looked = look(&files).map_err(bad_input)?;
         context.print(&looked, || text(&looked) + &say::next(&self.next(&looked)))

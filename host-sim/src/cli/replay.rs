@@ -7,9 +7,10 @@ use flexspline::Table;
 
 use super::context::{Context, image_file, quoted, table_of};
 use super::logs::LogOptions;
-use super::{Failure, bad_file, bad_input, say};
+use super::{Failure, bad_input, say};
 use flexspline_base::output::Outputs;
 use flexspline_identify::calibrate::WindUpTorque;
+use flexspline_identify::measurement::bytes_of;
 use flexspline_identify::replay::{ReplaySummary, RowsOf, RowsRead, read, replay};
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -49,7 +50,7 @@ impl Replay {
         context.refuse_drive("the drive is that of the table; allowed: --tables FILE.fxt")?;
         let image = image_file(&self.tables)?;
         let table = table_of(&self.tables, &image)?;
-        let bytes = std::fs::read(&self.data).map_err(bad_file(&self.data))?;
+        let (_, bytes) = bytes_of(&self.data).map_err(bad_input)?;
         let rows_of = RowsOf::beside(&self.data, &bytes);
         self.check_rows(rows_of.as_ref(), &table)?;
         // Found out before the rows are read.
@@ -100,8 +101,8 @@ pub(super) fn measured(
     temperature_c: f64,
     on_zero: bool,
 ) -> Result<RowsRead, Failure> {
-    let bytes = std::fs::read(data).map_err(bad_file(data))?;
-    read(&data.display().to_string(), &bytes, &logs.map()?, table, temperature_c, on_zero).map_err(bad_input)
+    let (file, bytes) = bytes_of(data).map_err(bad_input)?;
+    read(&file, bytes, &logs.map()?, table, temperature_c, on_zero).map_err(bad_input)
 }
 
 fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {

@@ -14,7 +14,7 @@ use super::{Failure, bad_input, say, within};
 use flexspline_base::output::Outputs;
 use flexspline_identify::causes::{ParameterSpec, Usual};
 use flexspline_identify::extension::{self, CauseEntry};
-use flexspline_identify::measurement::{ColumnMap, Session, read};
+use flexspline_identify::measurement::{self, ColumnMap, Session, bytes_of};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::synthesize::{
     Definition, DrawnUnit, Effect, MotionPlan, Sensors, Sizes, completed, effects, parse, synthesize, to_csv,
@@ -251,7 +251,8 @@ impl Synthesize {
             return Ok(plan.excite(random));
         };
         let map = ColumnMap::of_options(&self.excitation.columns, None, None).map_err(bad_input)?;
-        let recording = read(path, &map, &nominal.gear()).map_err(bad_input)?;
+        let (file, bytes) = bytes_of(path).map_err(bad_input)?;
+        let recording = measurement::parse(&file, bytes, &map, &nominal.gear()).map_err(bad_input)?;
         Ok(completed(&recording.sessions, RATE_HZ, nominal.temperature_c))
     }
 

@@ -60,7 +60,7 @@ use model::{Problem, Term, terms_at};
 use noise::Noise;
 pub use pipeline::{
     Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, WrittenTable, diagnose_rows,
-    parse_rows, read_rows,
+    parse_rows,
 };
 use prepare::FreeColumns;
 

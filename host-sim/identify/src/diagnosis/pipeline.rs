@@ -6,11 +6,10 @@
 //!         tables worth it? <- evaluate (sessions held out, read by the core) +-> drive-extended.toml
 //! ```
 //!
-//! [`Subject`] is what the rows are held against. [`read_rows`] and [`diagnose_rows`] come to the verdict;
+//! [`Subject`] is what the rows are held against. [`parse_rows`] and [`diagnose_rows`] come to the verdict;
 //! [`Diagnosed::extend`] makes the extended drive and its tables. Nothing is printed or written here.
 
 use std::error::Error;
-use std::path::Path;
 use std::sync::Arc;
 
 use blake3::Hash;
@@ -28,8 +27,7 @@ use crate::extension::{
     TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry, less,
 };
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, least_and_most,
-    parse,
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, least_and_most, parse,
 };
 use crate::nominal::{NoSuchWheels, Nominal};
 use crate::synthesize::{EffectError, Sizes};
@@ -312,22 +310,14 @@ pub struct Diagnosed {
     pub evaluation: Evaluation,
 }
 
-/// Reads the rows of a file, takes away what the model knows already, and averages rows that are too many.
+/// Reads rows, takes away what the model knows already, and averages rows that are too many: `bytes` of a file called
+/// `file`.
 ///
 /// # Errors
 /// The rows cannot be read, or do not fit what the model knows.
-pub fn read_rows(path: &Path, columns: &ColumnMap, subject: &Subject<'_>) -> Result<Recording, PipelineError> {
-    let (file, bytes) = bytes_of(path)?;
-    parse_rows(&file, &bytes, columns, subject)
-}
-
-/// The same of rows that stand in memory: `bytes` of a file called `file`.
-///
-/// # Errors
-/// As [`read_rows`].
 pub fn parse_rows(
     file: &str,
-    bytes: &[u8],
+    bytes: impl Into<Vec<u8>>,
     columns: &ColumnMap,
     subject: &Subject<'_>,
 ) -> Result<Recording, PipelineError> {

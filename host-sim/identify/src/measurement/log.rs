@@ -1,7 +1,6 @@
 //! A file as it stands: its columns in rad, s, N·m and °C, what is missing as NaN.
 
 use std::fmt;
-use std::io::Read;
 use std::ops::Range;
 
 use thiserror::Error;
@@ -138,26 +137,17 @@ pub(super) struct LogFile {
     pub own_zeros: bool,
 }
 
-/// The bytes of `source`, a file called `file`.
-pub(super) fn all_of(file: &str, mut source: impl Read) -> Result<Vec<u8>, MeasuredError> {
-    let mut bytes = Vec::new();
-    let read = source.read_to_end(&mut bytes);
-    read.map_err(|error| MeasuredError::at(file, TableProblem { line: 1, what: error.to_string() }))?;
-    Ok(bytes)
-}
-
 /// Reads a file called `file`, of at least `fewest` rows; `ratio` is that of the axis of a guide log, which says no
 /// generator angle.
 pub(super) fn read(
     file: &str,
-    source: impl Read,
+    bytes: Vec<u8>,
     map: &ColumnMap,
     ratio: f64,
     fewest: usize,
     findings: &mut Findings,
 ) -> Result<LogFile, MeasuredError> {
     let refuse = |problem: TableProblem| MeasuredError::at(file, problem);
-    let bytes = all_of(file, source)?;
     if phd2::is_one(&bytes) {
         return guide_log(&bytes, map, ratio, findings).map_err(refuse);
     }

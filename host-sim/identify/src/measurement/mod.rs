@@ -3,7 +3,7 @@
 //! Angles are radians, torque N·m, temperature °C, time s; `error` is output less generator over ratio, rad at the
 //! output. All columns of a session have the same length; what was not recorded is `None`.
 //!
-//! [`read`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps in
+//! [`parse`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps in
 //! time as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before anything
 //! is asked of the drive.
 
@@ -19,7 +19,6 @@ mod refusal;
 mod rollover;
 mod unit;
 
-use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
@@ -266,7 +265,10 @@ impl Recording {
 }
 
 /// The name of a file in messages, and its bytes.
-pub(crate) fn bytes_of(path: &Path) -> Result<(String, Vec<u8>), MeasuredError> {
+///
+/// # Errors
+/// It cannot be read.
+pub fn bytes_of(path: &Path) -> Result<(String, Vec<u8>), MeasuredError> {
     let file = path.display().to_string();
     match std::fs::read(path) {
         Ok(bytes) => Ok((file, bytes)),
@@ -277,22 +279,24 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(String, Vec<u8>), MeasuredError> 
     }
 }
 
-/// Reads a file of measured data of a drive with this `gear`.
-pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
-    let (file, bytes) = bytes_of(path)?;
-    parse(&file, &bytes[..], columns, gear)
-}
-
-/// Reads measured data from `source`, a file called `file`.
-pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
-    parse_at_least(FEWEST_ROWS, file, source, columns, gear)
+/// Reads measured data of a drive with this `gear`: `bytes` of a file called `file`.
+///
+/// # Errors
+/// They cannot be read.
+pub fn parse(
+    file: &str,
+    bytes: impl Into<Vec<u8>>,
+    columns: &ColumnMap,
+    gear: &Gear,
+) -> Result<Recording, MeasuredError> {
+    parse_at_least(FEWEST_ROWS, file, bytes, columns, gear)
 }
 
 /// [`parse`] of a file of at least `fewest` rows.
 pub(crate) fn parse_at_least(
     fewest: usize,
     file: &str,
-    source: impl Read,
+    bytes: impl Into<Vec<u8>>,
     columns: &ColumnMap,
     gear: &Gear,
 ) -> Result<Recording, MeasuredError> {
@@ -301,7 +305,8 @@ pub(crate) fn parse_at_least(
         return Err(refuse(Refusal::NoRatio(gear.ratio)));
     }
     let mut findings = Findings::default();
-    let LogFile { mut log, columns, own_zeros } = log::read(file, source, columns, gear.ratio, fewest, &mut findings)?;
+    let LogFile { mut log, columns, own_zeros } =
+        log::read(file, bytes.into(), columns, gear.ratio, fewest, &mut findings)?;
     let rows = log.len();
     let recorded = in_order(&mut log, &columns, &mut findings).map_err(refuse)?;
     enough(&log, recorded, fewest).map_err(refuse)?;

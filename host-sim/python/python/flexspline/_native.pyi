@@ -4,7 +4,7 @@ from typing import Any, TypedDict, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drive", "PlayState", "Table", "__version__", "calibrate", "diagnose", "project", "simulate", "tables"]
+__all__ = ["Drive", "PlayState", "Table", "__version__", "calibrate", "diagnose", "look", "project", "simulate", "tables"]
 
 __version__: str
 
@@ -150,6 +150,7 @@ def project(
     half_width_arcsec: float | None,
     deviation_arcsec: float | None,
 ) -> _MadeTable: ...
+def look(logs: list[_Log]) -> tuple[str, str]: ...
 def calibrate(
     logs: list[_Log],
     known: float | str | bytes,

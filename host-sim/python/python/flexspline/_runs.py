@@ -1,4 +1,4 @@
-"""What the command does, as functions: simulate, tables, calibrate, diagnose."""
+"""What the command does, as functions: simulate, tables, look, calibrate, diagnose."""
 
 from __future__ import annotations
 
@@ -197,6 +197,39 @@ def table_from_samples(
     return Table._made(parts)
 
 
+class Look(Fields):
+    """What is in logs: the fields of ``flexspline look --json``; as text, what that command prints."""
+
+    columns_option: str | None
+    """What to pass on as ``columns``; None where it is not clear."""
+    ratio_proposed: float | None
+    """The ratio that the rows speak for."""
+
+    def __init__(self, text: str, printed: str) -> None:
+        super().__init__(text)
+        self._printed = printed
+
+    def __repr__(self) -> str:
+        return self._printed
+
+
+def look(logs: object) -> Look:
+    """Columns, units, ratio, torque, time and coverage of logs, and the mapping to read them with: ``flexspline look``.
+
+    ``logs``: one log or a list of them, each a path or a table of columns, as for `calibrate`.
+
+    >>> look("bench.csv").columns_option  # doctest: +SKIP
+    """
+    return Look(*_native.look(_logs(logs)))
+
+
+def _logs(logs: object) -> list[str | tuple[str, bytes]]:
+    several = list(logs) if isinstance(logs, (list, tuple)) else [logs]
+    if not several:
+        raise BadInput("logs: found none, allowed: one or more")
+    return [log(one, f"data {k}" if len(several) > 1 else "data") for k, one in enumerate(several, 1)]
+
+
 class Calibration(Fields):
     """A unit's table from its logs: the fields of ``calibration.json``, ``table``, and ``shown``."""
 
@@ -259,12 +292,9 @@ def calibrate(
 
     >>> calibrate("bench.csv", ratio=101).save("unit7")  # doctest: +SKIP
     """
-    several = list(logs) if isinstance(logs, (list, tuple)) else [logs]
-    if not several:
-        raise BadInput("logs: found none, allowed: one or more")
     with shown(progress, "calibrate") as tell:
         text, parts, rows = _native.calibrate(
-            [log(one, f"data {k}" if len(several) > 1 else "data") for k, one in enumerate(several, 1)],
+            _logs(logs),
             _known(ratio, model, table),
             generator,
             (columns_option(columns), rate_hz, torque_constant),

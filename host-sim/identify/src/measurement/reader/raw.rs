@@ -1,10 +1,7 @@
 //! All columns of a file, for looking at it before anything is known of it.
 
-use std::io::Read;
-use std::path::Path;
-
-use super::super::log::{FEWEST_ROWS, MeasuredError, all_of};
-use super::super::{bytes_of, phd2};
+use super::super::log::{FEWEST_ROWS, MeasuredError};
+use super::super::phd2;
 use super::{Columns, FoundCell, Sheet, shortened};
 use flexspline_base::csv_rows::TableProblem;
 
@@ -19,23 +16,14 @@ pub struct RawFile {
     pub(crate) columns: Columns,
 }
 
-/// Reads a file of numbers.
+/// Reads numbers: `bytes` of a file called `file`.
 ///
 /// # Errors
-/// The file cannot be read, is no text, or holds no rows of numbers.
-pub fn read(path: &Path) -> Result<RawFile, MeasuredError> {
-    let (file, bytes) = bytes_of(path)?;
-    parse(&file, &bytes[..])
-}
-
-/// Reads numbers from `source`, a file called `file`.
-///
-/// # Errors
-/// As [`read`].
-pub fn parse(file: &str, source: impl Read) -> Result<RawFile, MeasuredError> {
+/// They are no text, or hold no rows of numbers.
+pub fn parse(file: &str, bytes: impl Into<Vec<u8>>) -> Result<RawFile, MeasuredError> {
     let at = |problem: TableProblem| MeasuredError::at(file, problem);
     let refuse = |line: u64, what: String| Err(at(TableProblem { line, what }));
-    let bytes = all_of(file, source)?;
+    let bytes = bytes.into();
     if phd2::is_one(&bytes) {
         let what = "a guide log of PHD2 has columns of its own, and needs no mapping: flexspline calibrate FILE \
                     --ratio N";
