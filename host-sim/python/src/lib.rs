@@ -19,7 +19,7 @@ mod native {
     #[pymodule_export]
     use super::drive::Drive;
     #[pymodule_export]
-    use super::measured::{calibrate, diagnose, look};
+    use super::measured::{calibrate, diagnose, look, synthesize};
     #[pymodule_export]
     use super::simulate::simulate;
     #[pymodule_export]

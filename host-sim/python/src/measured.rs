@@ -9,10 +9,14 @@ use flexspline_design::kernels::Kernels;
 use flexspline_identify::calibrate::{CalibrationError, Prior, calibrate as fit};
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::{Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows};
-use flexspline_identify::extension::Model;
+use flexspline_identify::extension::{CauseEntry, Model};
 use flexspline_identify::known_rows::parse_known;
 use flexspline_identify::look::{look as look_at, text};
 use flexspline_identify::measurement::{ColumnMap, MeasuredError, Session, bytes_of, raw};
+use flexspline_identify::nominal::Nominal;
+use flexspline_identify::synthesize::{
+    DrawnUnit, MotionPlan, RATE_HZ, Sensors, Sizes, parse, synthesize as make, to_csv, within_temperatures,
+};
 use flexspline_mechanics::drive::Drive as MechanicsDrive;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
@@ -77,6 +81,50 @@ pub enum KnownFrom {
     /// A nominal model.
     #[pyo3(transparent)]
     Model(PathBuf),
+}
+
+/// Rows of a drive with hidden effects, each `NAME:param=value,…`, as `flexspline synthesize` makes them with this seed:
+/// a CSV, and the text of the effects with all values. `motion` is sessions, rows in each, largest speed (rad/s) and
+/// torque (N·m), `noise_arcsec` white noise and wander.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "each is an option of the run")]
+pub fn synthesize(
+    known: KnownFrom,
+    drive: &Drive,
+    effects: Vec<String>,
+    motion: (usize, usize, f64, f64),
+    temperatures_c: [f64; 2],
+    noise_arcsec: [f64; 2],
+    spread: bool,
+    seed: u64,
+) -> PyResult<(String, String)> {
+    let table = match &known {
+        KnownFrom::Image(image) => Some(Table::check(image).map_err(bad)?),
+        _ => None,
+    };
+    let (nominal, mut chosen) = match (&known, &table) {
+        (KnownFrom::Model(path), _) => {
+            let Model { nominal, causes, .. } = Model::read(path).map_err(bad)?;
+            (nominal, causes.iter().filter_map(CauseEntry::effect).collect())
+        }
+        (_, Some(table)) => (Nominal::of_table(table), Vec::new()),
+        _ => return Err(bad("expected model or table")),
+    };
+    for text in &effects {
+        chosen.push(parse(text).map_err(|error| bad(format!("effects: {error}")))?);
+    }
+    let mut random = fastrand::Rng::with_seed(seed);
+    let (sessions, rows, speed_rad_s, torque_n_m) = motion;
+    let plan = MotionPlan { sessions, rows, rate_hz: RATE_HZ, speed_rad_s, torque_n_m };
+    let mut motion = plan.excite(&mut random);
+    within_temperatures(&mut motion, temperatures_c);
+    let unit = if spread { DrawnUnit::draw(&nominal, &mut random) } else { DrawnUnit::nominal(&nominal) };
+    let [white_arcsec, wander_arcsec] = noise_arcsec;
+    let sensors = Sensors { white_arcsec, wander_arcsec, ..Sensors::USUAL };
+    let drawn = (&nominal, table.as_ref());
+    let made = make(drawn, Sizes::of(&drive.0), &chosen, motion, &sensors, &unit, &mut random).map_err(bad)?;
+    let csv = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
+    Ok((csv, serde_json::to_string(&made.effects).map_err(bad)?))
 }
 
 /// Logs of one unit to its table: the text of `calibration.json`, the table, and the rows of a picture.

@@ -153,6 +153,22 @@ def test_missing_values_and_times_are_taken_as_they_are(log_file: Path, tmp_path
     assert flexspline.diagnose(nullable, model=MODEL).json == of_file.json
 
 
+def test_synthesize_is_the_command(tmp_path: Path) -> None:
+    effect = "gravity_torque:amplitude_n_m=3"
+    command("synthesize", "--model", MODEL, "--effect", effect, "--seed", 5, "--rows", 400, "--out", tmp_path)
+    made = flexspline.synthesize(effect, model=MODEL, seed=5, rows=400)
+    theirs = read_csv(tmp_path / "data.csv")
+    assert list(made) == list(theirs)
+    for name, column in theirs.items():
+        np.testing.assert_array_equal(made[name], np.array(column, dtype=float))
+    assert [one.json for one in made.effects] == read_json(tmp_path / "truth.json")["effects"]
+    assert flexspline.calibrate(made, model=MODEL).held_out.rms_before_arcsec > 0
+    with pytest.raises(BadInput, match="speed_rad_s: found 0"):
+        flexspline.synthesize(model=MODEL, speed_rad_s=0)
+    with pytest.raises(BadInput, match="effects: .*gravity_torque"):
+        flexspline.synthesize("gravity_torqe", model=MODEL)
+
+
 def test_look_is_the_command(log_file: Path) -> None:
     assert flexspline.look(log_file).json == json.loads(command("look", log_file, "--json").stdout)
     of_frame = flexspline.look([frame_of(log_file)])

@@ -604,33 +604,12 @@ pub(crate) const PAGE_SCHEMA: u32 = 1;
 /// Beginning of the JSON block of a page.
 const BLOCK: &str = "id=\"flexspline-report\">";
 
-/// Command, title and provenance of a page that was written.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WrittenPage {
-    /// The command that wrote it.
-    pub command: String,
-    /// Its title.
-    pub title: String,
-    /// The values of what made it.
-    provenance: Vec<String>,
-}
-
-impl WrittenPage {
-    /// Of the text of a page; nothing of what is none of ours.
-    pub fn of(html: &str) -> Option<WrittenPage> {
-        let (_, block) = html.split_once(BLOCK)?;
-        let json: Value = serde_json::from_str(block.split_once("</script")?.0).ok()?;
-        let word = |name: &str| json[name].as_str().map(str::to_owned);
-        let command = word("report").filter(|name| name.bytes().all(|letter| letter.is_ascii_lowercase()))?;
-        let provenance = json["provenance"].as_object()?.values();
-        let provenance = provenance.filter_map(|value| value.as_str().map(str::to_owned)).collect();
-        Some(WrittenPage { command, title: word("title")?, provenance })
-    }
-
-    /// Whether a value is among what made it, such as the hash of a drive.
-    pub fn names(&self, value: &str) -> bool {
-        self.provenance.iter().any(|made| made == value)
-    }
+/// The command that wrote a page, of its text; nothing of what is none of ours.
+pub fn command_of(html: &str) -> Option<String> {
+    let (_, block) = html.split_once(BLOCK)?;
+    let json: Value = serde_json::from_str(block.split_once("</script")?.0).ok()?;
+    let command = json["report"].as_str()?;
+    command.bytes().all(|letter| letter.is_ascii_lowercase()).then(|| command.to_owned())
 }
 
 /// Provenance of a page of a drive: the command, this program, the drive and its hash.
@@ -815,12 +794,10 @@ mod tests {
     }
 
     #[test]
-    fn a_page_says_of_itself_which_command_wrote_it_and_of_what() {
-        let written = WrittenPage::of(&page(Status::Good).html().unwrap()).unwrap();
-        assert_eq!((written.command.as_str(), written.title.as_str()), ("tables", HOSTILE));
-        assert!(written.names(HOSTILE) && !written.names("tables"));
-        assert_eq!(WrittenPage::of("<!doctype html><p>another page"), None);
-        assert_eq!(WrittenPage::of("id=\"flexspline-report\">{\"report\":\"../x\"}</script>"), None);
+    fn a_page_says_of_itself_which_command_wrote_it() {
+        assert_eq!(command_of(&page(Status::Good).html().unwrap()).as_deref(), Some("tables"));
+        assert_eq!(command_of("<!doctype html><p>another page"), None);
+        assert_eq!(command_of("id=\"flexspline-report\">{\"report\":\"../x\"}</script>"), None);
     }
 
     #[test]

@@ -190,9 +190,6 @@ impl Calibrate {
         let known = known.as_ref().map(|made| table_of(Path::new("drive-extended"), &made.image)).transpose()?;
         let prior = known.as_ref().map_or(prior, |known| Prior::of_table(known, self.generator));
         let out = context.out()?;
-        if !self.no_report {
-            report::before(context, out, "calibrate", None);
-        }
         let (entries, counts) = self.encoder_table.unwrap_or((USUAL_ENTRIES, None));
         let counts = counts.or_else(|| map.counts_of_output());
         if self.encoder_table.is_some() && counts.is_none() {

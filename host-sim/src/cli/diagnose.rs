@@ -89,9 +89,6 @@ impl Diagnose {
         let recording = parse_rows(&file, bytes, &map, &subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
-        if !self.no_report {
-            report::before(context, out, "diagnose", None);
-        }
         let by_fem = |drive: &Drive, kind, mesh| match fresh_table(context, drive, kind, mesh) {
             Err(Failure::BadInput(what) | Failure::Failed(what)) => Err(what.into()),
             Ok(made) => Ok(made),

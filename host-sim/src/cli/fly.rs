@@ -64,9 +64,6 @@ impl Fly {
         }
         flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
         let out = context.out()?;
-        if !self.no_report {
-            report::before(context, out, "fly", None);
-        }
         let (progress, done) = (context.progress("fly"), AtomicUsize::new(0));
         let progress_line = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;

@@ -2,13 +2,13 @@
 //! another name.
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flexspline::Table;
 use rayon::prelude::*;
 
-use super::{Context, Failure, say};
+use super::{Context, Failure};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::TableInfo;
 use flexspline_design::tables::validate::Validation;
@@ -21,7 +21,7 @@ use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::animation::{Animation, AnimationError, animate};
 use flexspline_report::diagnosis_report::{self, DiagnosisSources};
-use flexspline_report::page::{Page, WrittenPage};
+use flexspline_report::page::{Page, command_of};
 use flexspline_report::{DriveSources, DriveSubject, drive_report, shown_torque_n_m};
 
 /// The page of tables of a drive; with each table, its record if it was made just now, or how it did against fresh FEM.
@@ -103,46 +103,6 @@ pub(super) fn diagnosis<'p>(
 /// The page of every command.
 const PAGE: &str = "report.html";
 
-/// Says, before there is much work, what becomes of a page that stands where the command `name` is to write one: that
-/// of another command is kept under another name, that of the same command is replaced. Of another drive than this that
-/// is said, too.
-pub(super) fn before(context: &Context, out: &Path, name: &str, drive: Option<&Drive>) {
-    if let Some(words) = fate(&out.join(PAGE), name, drive).filter(|_| !context.quiet()) {
-        say::talk(&format!("remark: {words}"));
-    }
-}
-
-/// Note on the fate of a page, where one is needed.
-fn fate(path: &Path, name: &str, drive: Option<&Drive>) -> Option<String> {
-    let html = std::fs::read_to_string(path).ok()?;
-    let found = path.display();
-    let Some(written) = WrittenPage::of(&html) else {
-        return Some(format!(
-            "{found} is none of our pages; once there is a new one it is kept as {}",
-            kept(path, None).display()
-        ));
-    };
-    if written.command != name {
-        let kept = kept(path, Some(&written));
-        let WrittenPage { command, title, .. } = written;
-        return Some(format!(
-            "{found} is the page of `{command}` ({title}); once there is a new one it is kept as {}",
-            kept.display()
-        ));
-    }
-    let other = drive.is_some_and(|drive| !written.names(&blake3::Hash::from(drive.hash()).to_hex()));
-    other.then(|| {
-        format!("{found} is the page of another drive ({}); it is replaced: --out names another folder", written.title)
-    })
-}
-
-/// Where the page of another command, or a page that is none of ours, is kept.
-fn kept(path: &Path, written: Option<&WrittenPage>) -> PathBuf {
-    let of = written.map_or("other", |written| written.command.as_str());
-    let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or("report");
-    path.with_file_name(format!("{stem}-{of}.html"))
-}
-
 /// Writes the page; a failure that it is stamped with is that of the command.
 pub(super) fn write(page: &Page, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
     write_to(page, &out.join(PAGE), outputs)
@@ -152,9 +112,11 @@ pub(super) fn write(page: &Page, out: &Path, outputs: &mut Outputs) -> Result<()
 pub(super) fn write_to(page: &Page, path: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
     let html = page.html().map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?;
     if let Ok(standing) = std::fs::read(path) {
-        let written = WrittenPage::of(&String::from_utf8_lossy(&standing));
-        if written.as_ref().is_none_or(|written| written.command != page.command_name) {
-            outputs.file(&kept(path, written.as_ref()), |file| file.write_all(&standing))?;
+        let written_by = command_of(&String::from_utf8_lossy(&standing)).unwrap_or_else(|| "other".to_owned());
+        if written_by != page.command_name {
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            let kept = path.with_file_name(format!("{stem}-{written_by}.html"));
+            outputs.file(&kept, |file| file.write_all(&standing))?;
         }
     }
     outputs.file(path, |file| file.write_all(html.as_bytes()))?;
@@ -172,35 +134,4 @@ pub(super) fn stamped(page: &Page, out: &Path) -> Result<(), Failure> {
         page.remarks.join(" "),
         out.join("report.html").display()
     )))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A page as far as it says whose it is.
-    fn of(command: &str, drive: &Drive) -> String {
-        let hash = blake3::Hash::from(drive.hash()).to_hex();
-        let provenance = serde_json::json!({ "drive_hash": *hash });
-        let title = format!("Page of {}", drive.name);
-        let json = serde_json::json!({ "report": command, "title": title, "provenance": provenance });
-        format!("<script type=\"application/json\" id=\"flexspline-report\">{json}</script>")
-    }
-
-    #[test]
-    fn a_page_of_another_command_or_drive_is_not_replaced_without_a_word() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(PAGE);
-        let (drive, other) = (Drive::hhd_95(), Drive::built_in("CUP-95").unwrap());
-        assert_eq!(fate(&path, "sweep", Some(&drive)), None);
-        std::fs::write(&path, of("sweep", &drive)).unwrap();
-        assert_eq!(fate(&path, "sweep", Some(&drive)), None);
-        assert_eq!(fate(&path, "sweep", None), None);
-        let replaced = fate(&path, "sweep", Some(&other)).unwrap();
-        assert!(replaced.contains("of another drive (Page of HHD-95); it is replaced"), "{replaced}");
-        let kept = fate(&path, "simulate", Some(&drive)).unwrap();
-        assert!(kept.contains("the page of `sweep` (Page of HHD-95)") && kept.ends_with("report-sweep.html"), "{kept}");
-        std::fs::write(&path, "<p>mine").unwrap();
-        assert!(fate(&path, "sweep", Some(&drive)).unwrap().ends_with("report-other.html"));
-    }
 }

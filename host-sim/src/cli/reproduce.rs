@@ -39,7 +39,6 @@ impl Reproduce {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
         let out = context.out()?;
-        report::before(context, out, "reproduce", Some(&drive));
         let mesh = if self.quick { MeshLevel::Coarse } else { self.mesh.unwrap_or(MeshLevel::Standard) };
         let progress = context.progress("reproduce");
         let result = reproduce(&drive, mesh, self.quick, &context.command, &|done, total, note| {

@@ -146,9 +146,6 @@ impl Simulate {
         let settings = self.settings(&drive)?;
         settings.check(&drive).map_err(bad_input)?;
         let out = context.out()?;
-        if !self.no_report {
-            report::before(context, out, "simulate", Some(&drive));
-        }
 
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
         let progress = context.progress(settings.generator.name());

@@ -177,7 +177,6 @@ impl SweepCommand {
         let out = context.out_for_plan(NUMBER)?;
         let plan = plan.made(context)?;
         let judge = self.judged.judge(&plan)?;
-        report::before(context, out, "sweep", Some(&plan.drive));
         let plan = plan.write(out)?;
         computed(context, &plan, out, Shard::WHOLE)?;
         reduced(context, &plan, out, &judge, None)

@@ -17,18 +17,11 @@ use flexspline_identify::extension::{self, CauseEntry};
 use flexspline_identify::measurement::{self, ColumnMap, Session, bytes_of};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::synthesize::{
-    Definition, DrawnUnit, Effect, MotionPlan, Sensors, Sizes, completed, effects, parse, synthesize, to_csv,
+    Definition, DrawnUnit, Effect, MotionPlan, RATE_HZ, Sensors, Sizes, completed, effects, parse, synthesize, to_csv,
     within_temperatures,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
-
-/// Time scale of the drift, s.
-const WANDER_S: f64 = 12.0;
-/// Resolution of the output encoder, bits per turn.
-const ENCODER_BITS: u32 = 22;
-/// Rows per second.
-const RATE_HZ: f64 = 100.0;
 
 /// Make synthetic measurements: a simulated drive with effects, noise and sensors of your choice
 ///
@@ -173,10 +166,7 @@ impl Synthesize {
             within_temperatures(&mut motion, temperatures);
         }
         let unit = if self.no_spread { DrawnUnit::nominal(&nominal) } else { DrawnUnit::draw(&nominal, &mut random) };
-        let sizes = Sizes {
-            pitch_radius_mm: drive.circular_spline.pitch_radius_mm(),
-            base_radius_mm: drive.circular_spline.base_radius_mm(),
-        };
+        let sizes = Sizes::of(&drive);
         let drive = (&nominal, table.as_ref());
         let made = synthesize(drive, sizes, &chosen, motion, &sensors, &unit, &mut random)
             .map_err(|error| Failure::BadInput(format!("--effect: {error}")))?;
@@ -196,7 +186,7 @@ impl Synthesize {
             },
             noise_arcsec: self.noise_arcsec,
             wander_arcsec: self.wander_arcsec,
-            encoder_bits: ENCODER_BITS,
+            encoder_bits: sensors.encoder_bits,
             sessions: made.sessions.len(),
             rows: made.sessions.iter().map(Session::len).sum(),
         };
@@ -231,8 +221,7 @@ impl Synthesize {
             Sensors {
                 white_arcsec: within("--noise-arcsec", self.noise_arcsec, 0.0, 1e5)?,
                 wander_arcsec: within("--wander-arcsec", self.wander_arcsec, 0.0, 1e5)?,
-                wander_s: WANDER_S,
-                encoder_bits: ENCODER_BITS,
+                ..Sensors::USUAL
             },
             temperatures,
         ))

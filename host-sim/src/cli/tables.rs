@@ -156,9 +156,6 @@ impl Tables {
             // The sheet has all that is missing; the regularity over sheets would be added to it.
             drive.output.contact_compliance = 0.0;
         }
-        if !self.no_report {
-            report::before(context, context.out_path(), "tables", Some(&drive));
-        }
         let tried = match &self.from_samples {
             Some(file) => vec![self.project(&drive, generators, file)],
             None => self.sweep(context, &drive, generators, stated.as_ref(), sheet.as_ref())?,

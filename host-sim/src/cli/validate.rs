@@ -121,9 +121,6 @@ impl Validate {
         let checked = images.iter().map(|(path, image)| CheckedTable::of(path, image, &drive));
         let checked = checked.collect::<Result<Vec<_>, Failure>>()?;
         let out = context.out()?;
-        if !self.no_report && page_path(out, &self.tables).ends_with("report.html") {
-            report::before(context, out, "validate", Some(&drive));
-        }
         let settings = ValidationSettings {
             torques: usize::from(self.torques),
             temperatures: usize::from(self.temperatures),

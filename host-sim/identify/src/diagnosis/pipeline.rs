@@ -195,13 +195,6 @@ impl<'a> Subject<'a> {
         Ok(())
     }
 
-    fn sizes(&self) -> Sizes {
-        Sizes {
-            pitch_radius_mm: self.drive.circular_spline.pitch_radius_mm(),
-            base_radius_mm: self.drive.circular_spline.base_radius_mm(),
-        }
-    }
-
     /// The model, if it holds causes that were found before.
     fn extended(&self) -> Option<&Model> {
         self.model.as_ref().filter(|model| !model.causes.is_empty())
@@ -214,7 +207,7 @@ impl<'a> Subject<'a> {
         if model.causes.is_empty() {
             return Ok(None);
         }
-        let added = model.added_arcsec(&recording.sessions, self.sizes()).map_err(PipelineError::Known)?;
+        let added = model.added_arcsec(&recording.sessions, Sizes::of(&self.drive)).map_err(PipelineError::Known)?;
         let names: Vec<&str> = model.causes.iter().map(|cause| cause.name.as_str()).collect();
         Ok(Some((names.join(", "), added)))
     }
@@ -658,7 +651,7 @@ fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, files: &[Record
     ExtendedTables {
         nominal: &subject.nominal,
         table: subject.table.as_ref(),
-        known: subject.extended().map(|model| (model, subject.sizes())),
+        known: subject.extended().map(|model| (model, Sizes::of(&subject.drive))),
         subject: of,
         torque_n_m: torque[0].abs().max(torque[1].abs()),
         temperatures_c: temperature,

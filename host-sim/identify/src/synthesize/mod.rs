@@ -18,6 +18,7 @@ pub use data_fault::to_csv;
 pub use excitation::{MotionPlan, completed, within_temperatures};
 
 use flexspline::Table;
+use flexspline_mechanics::drive::Drive;
 
 use catalogue::Setting;
 
@@ -41,6 +42,14 @@ pub struct Sensors {
     /// Resolution of the output encoder, bits to a turn.
     pub encoder_bits: u32,
 }
+
+impl Sensors {
+    /// Sensors without noise, whose wander, if there is any, takes some seconds. *Guess*.
+    pub const USUAL: Sensors = Sensors { white_arcsec: 0.0, wander_arcsec: 0.0, wander_s: 12.0, encoder_bits: 22 };
+}
+
+/// Rows of a made-up run per second. *Guess*.
+pub const RATE_HZ: f64 = 100.0;
 
 /// White noise of the torque sensor, of the largest torque. *Guess*.
 const TORQUE_NOISE: f64 = 5e-4;
@@ -71,6 +80,15 @@ pub struct Sizes {
     pub pitch_radius_mm: f64,
     /// Radius of the base circle, mm: a displacement along the normal of a flank turns the output.
     pub base_radius_mm: f64,
+}
+
+impl Sizes {
+    /// Those of a drive.
+    #[must_use]
+    pub fn of(drive: &Drive) -> Sizes {
+        let wheel = &drive.circular_spline;
+        Sizes { pitch_radius_mm: wheel.pitch_radius_mm(), base_radius_mm: wheel.base_radius_mm() }
+    }
 }
 
 /// One unit: its deviations from the drawing.

@@ -18,10 +18,12 @@ from ._runs import (
     Diagnosis,
     Look,
     Simulation,
+    Synthesized,
     calibrate,
     diagnose,
     look,
     simulate,
+    synthesize,
     table_from_samples,
     tables,
 )
@@ -48,6 +50,7 @@ __all__ = [
     "Quality",
     "Replay",
     "Simulation",
+    "Synthesized",
     "Table",
     "WindUp",
     "__version__",
@@ -55,6 +58,7 @@ __all__ = [
     "diagnose",
     "look",
     "simulate",
+    "synthesize",
     "table_from_samples",
     "tables",
 ]

@@ -4,7 +4,7 @@ from typing import Any, TypedDict, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drive", "PlayState", "Table", "__version__", "calibrate", "diagnose", "look", "project", "simulate", "tables"]
+__all__ = ["Drive", "PlayState", "Table", "__version__", "calibrate", "diagnose", "look", "project", "simulate", "synthesize", "tables"]
 
 __version__: str
 
@@ -150,6 +150,16 @@ def project(
     half_width_arcsec: float | None,
     deviation_arcsec: float | None,
 ) -> _MadeTable: ...
+def synthesize(
+    known: float | str | bytes,
+    drive: Drive,
+    effects: list[str],
+    motion: tuple[int, int, float, float],
+    temperatures_c: tuple[float, float],
+    noise_arcsec: tuple[float, float],
+    spread: bool,
+    seed: int,
+) -> tuple[str, str]: ...
 def look(logs: list[_Log]) -> tuple[str, str]: ...
 def calibrate(
     logs: list[_Log],

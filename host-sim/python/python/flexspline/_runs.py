@@ -1,8 +1,11 @@
-"""What the command does, as functions: simulate, tables, look, calibrate, diagnose."""
+"""What the command does, as functions: simulate, tables, look, synthesize, calibrate, diagnose."""
 
 from __future__ import annotations
 
+import csv
+import json
 import os
+import secrets
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -228,6 +231,68 @@ def _logs(logs: object) -> list[str | tuple[str, bytes]]:
     if not several:
         raise BadInput("logs: found none, allowed: one or more")
     return [log(one, f"data {k}" if len(several) > 1 else "data") for k, one in enumerate(several, 1)]
+
+
+class Synthesized(Columns):
+    """Made-up measurements: the columns of ``data.csv``, which `calibrate` and `diagnose` take; and ``effects``."""
+
+    effects: list[Fields]
+    """What was hidden, with all values, as in ``truth.json``."""
+
+    def __init__(self, columns: Mapping[str, Any], effects: list[Fields]) -> None:
+        super().__init__(columns)
+        self.effects = effects
+
+
+def synthesize(
+    effects: str | Sequence[str] = (),
+    *,
+    model: PathLike | None = None,
+    table: Table | PathLike | bytes | None = None,
+    drive: Drive | PathLike = "HHD-95",
+    sessions: int = 6,
+    rows: int = 3000,
+    speed_rad_s: float = 6.0,
+    torque_n_m: float = 40.0,
+    temperatures_c: tuple[float, float] = (-20.0, 50.0),
+    noise_arcsec: float = 2.0,
+    wander_arcsec: float = 0.8,
+    spread: bool = True,
+    seed: int | None = None,
+) -> Synthesized:
+    """Measurements of a drive with effects of your choice, to try `diagnose` on: ``flexspline synthesize``, with its defaults.
+
+    ``effects`` as the command takes them (``gravity_torque:amplitude_n_m=3``; ``flexspline synthesize --list`` has all). The drive is a
+    ``model`` (a nominal.toml) or a ``table`` of ``drive``; with ``spread`` its unit is drawn. The same ``seed`` gives the same rows.
+
+    >>> synthesize("flexspline_runout", model="nominal.toml", seed=1).rows  # doctest: +SKIP
+    """
+    allowed = {
+        "sessions": (sessions, 1, 100),
+        "rows": (rows, 50, 1_000_000),
+        "speed_rad_s": (speed_rad_s, 1e-3, 1e3),
+        "torque_n_m": (torque_n_m, 1e-3, 1e5),
+        "noise_arcsec": (noise_arcsec, 0, 1e5),
+        "wander_arcsec": (wander_arcsec, 0, 1e5),
+        "temperatures_c": (temperatures_c[0], -200, temperatures_c[1]),
+        "temperatures_c[1]": (temperatures_c[1], temperatures_c[0], 300),
+    }
+    for name, (value, least, most) in allowed.items():
+        if not least <= value <= most:
+            raise BadInput(f"{name}: found {value}, allowed: {least} to {most}")
+    text, hidden = _native.synthesize(
+        _known(None, model, table),
+        drive_of(drive)._inner,
+        [effects] if isinstance(effects, str) else list(effects),
+        (sessions, rows, speed_rad_s, torque_n_m),
+        (temperatures_c[0], temperatures_c[1]),
+        (noise_arcsec, wander_arcsec),
+        spread,
+        secrets.randbits(32) if seed is None else seed,
+    )
+    names_of, *lines = csv.reader(text.splitlines())
+    columns = np.array([[float(cell) if cell else np.nan for cell in line] for line in lines]).T
+    return Synthesized(dict(zip(names_of, columns, strict=True)), [Fields(one) for one in json.loads(hidden)])
 
 
 class Calibration(Fields):
