@@ -175,9 +175,29 @@ struct Model {
 impl Model {
     /// Sum of the parts, arcsec.
     fn adds_arcsec(&self, at: &State) -> f64 {
+        self.columns(at).iter().zip(&self.coefficients).map(|(column, coefficient)| column * coefficient).sum()
+    }
+
+    /// The columns of its parts.
+    fn columns(&self, at: &State) -> Vec<f64> {
         let mut columns = Vec::with_capacity(self.coefficients.len());
         self.chosen.iter().for_each(|chosen| parts::columns(chosen.part, at, &self.scales, &mut columns));
-        columns.iter().zip(&self.coefficients).map(|(column, coefficient)| column * coefficient).sum()
+        columns
+    }
+
+    /// The coefficients that say the same where the generator's angle is larger by this, and the output's with it.
+    fn turned(&self, by_rad: f64, ratio: f64) -> Vec<f64> {
+        let mut turned = self.coefficients.clone();
+        for (part, width) in self.chosen.iter().map(|chosen| (chosen.part, parts::weights(chosen.part).len())) {
+            let begin = self.of(part).map_or(0, |place| place.start);
+            let angles = parts::wave_angles(part, by_rad, by_rad / ratio, &self.scales);
+            let orders = angles.flat_map(|(angle, orders)| (1..=orders).map(move |k| f64::from(k) * angle));
+            for (pair, by) in turned[begin..begin + width].chunks_exact_mut(2).zip(orders) {
+                let ((sin, cos), [of_sine, of_cosine]) = (by.sin_cos(), [pair[0], pair[1]]);
+                pair.copy_from_slice(&[of_sine * cos + of_cosine * sin, of_cosine * cos - of_sine * sin]);
+            }
+        }
+        turned
     }
 
     /// Sum of the prior and the parts, arcsec.

@@ -157,6 +157,10 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
     let [low, high] = scales.torque_n_m;
     let load = at.torque_n_m.clamp(low.min(0.0), high.max(0.0)) / scales.most_torque();
     let lag = -at.way;
+    let of_waves = |to: &mut Vec<f64>| {
+        let angles = wave_angles(part, at.generator_rad, at.output_rad, scales);
+        angles.for_each(|(angle, orders)| waves(angle, orders, to));
+    };
     match part {
         PartName::WindUp => {
             let ends = chebyshev(scales.torque_share(at.torque_n_m));
@@ -171,10 +175,9 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             // The lag without load, the lag under the largest, and the flank: none of them is negative.
             to.extend([lag * (1.0 - load.abs()), lag * load.abs(), flank]);
         }
-        PartName::GeneratorAngle => waves(at.generator_rad, GENERATOR_ORDERS, to),
-        PartName::MaterialAngle => waves(at.generator_rad - at.output_rad, GENERATOR_ORDERS, to),
-        PartName::ToothPitch => waves(scales.teeth * at.generator_rad, TOOTH_ORDERS, to),
-        PartName::OutputAngle => waves(at.output_rad, OUTPUT_ORDERS, to),
+        PartName::GeneratorAngle | PartName::MaterialAngle | PartName::ToothPitch | PartName::OutputAngle => {
+            of_waves(to)
+        }
         PartName::Temperature => {
             let warm = scales.temperature_share(at.temperature_c);
             to.extend([warm, warm * load, warm * lag]);
@@ -187,11 +190,29 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             let by_load = part == PartName::WavesByLoad;
             let factor = if by_load { scales.torque_share(at.torque_n_m) } else { flank(at, scales) };
             let begin = to.len();
-            waves(at.generator_rad, GENERATOR_ORDERS, to);
-            waves(at.output_rad, OUTPUT_ORDERS, to);
+            of_waves(to);
             to[begin..].iter_mut().for_each(|wave| *wave *= factor);
         }
     }
+}
+
+/// The angles that a part has waves of, with their orders, where generator and output stand so.
+pub(super) fn wave_angles(
+    part: PartName,
+    generator_rad: f64,
+    output_rad: f64,
+    scales: &Scales,
+) -> impl Iterator<Item = (f64, u16)> {
+    let (of_generator, of_output) = ((generator_rad, GENERATOR_ORDERS), (output_rad, OUTPUT_ORDERS));
+    let angles = match part {
+        PartName::GeneratorAngle => [Some(of_generator), None],
+        PartName::MaterialAngle => [Some((generator_rad - output_rad, GENERATOR_ORDERS)), None],
+        PartName::ToothPitch => [Some((scales.teeth * generator_rad, TOOTH_ORDERS)), None],
+        PartName::OutputAngle => [Some(of_output), None],
+        PartName::WavesByLoad | PartName::WavesByFlank => [Some(of_generator), Some(of_output)],
+        PartName::WindUp | PartName::Play | PartName::Temperature | PartName::ReadingDelay(_) => [None, None],
+    };
+    angles.into_iter().flatten()
 }
 
 /// The flank that bears: 1 where the load turns the output forward, or it lags without one; else -1.

@@ -9,9 +9,10 @@ use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
 use super::reading::Reading;
 use super::rows::{Recorded, Rows};
-use super::zero::{PhaseSearch, within};
+use super::zero::{PhaseSearch, thinned, within};
 use super::{Model, SAME_TORQUE};
 use crate::measurement::{Recording, least_and_most};
+use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Logs do not agree if fits to each alone leave less than this share of what one fit to all leaves, rms. A guess.
@@ -291,10 +292,14 @@ impl LogPair<'_> {
     fn search<T>(&self, most: usize, of: impl FnOnce(&PhaseSearch<'_>) -> T) -> Option<T> {
         let (folds, chosen) = by_log(&self.rows, self.parts, self.scales);
         let first = Model { coefficients: folds.fit(&[0], &chosen, &[])?, chosen, scales: *self.scales };
-        let says = |at: &State| first.says_arcsec(at, self.prior);
-        let of_log = self.rows.rows.iter().filter(|row| row.at.log == self.log);
-        let rows = (of_log, (|row| row.measured_arcsec) as fn(&Row) -> f64);
-        Some(of(&PhaseSearch::new(&says, self.prior.nominal.ratio, rows, self.scales.friction_n_m, most)))
+        let rows = thinned(self.rows.rows.iter().filter(|row| row.at.log == self.log), most);
+        let columns: Vec<Vec<f64>> = rows.iter().map(|row| first.columns(&row.at)).collect();
+        let says = |zero: f64| {
+            let turned = first.turned(zero, self.prior.nominal.ratio);
+            let prior = |at: State| self.prior.steady_arcsec(&State { generator_rad: at.generator_rad - zero, ..at });
+            rows.iter().zip(&columns).map(|(row, columns)| prior(row.at) + dot(columns, &turned)).collect()
+        };
+        Some(of(&PhaseSearch::new(&says, &rows, self.scales.friction_n_m)))
     }
 
     /// The zero of the other that the waves say.

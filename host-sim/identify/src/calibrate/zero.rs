@@ -92,9 +92,8 @@ fn repeats(table: &Table<'_>) -> f64 {
 /// Rows against a curve that goes with the angle of the generator; what no phase changes (the zero of each log, load,
 /// direction) is projected out.
 pub(super) struct PhaseSearch<'a> {
-    says: &'a dyn Fn(&State) -> f64,
-    ratio: f64,
-    at: Vec<State>,
+    /// The curve at the rows, arcsec, where the generator's angle is taken off by this, rad.
+    says: &'a dyn Fn(f64) -> Vec<f64>,
     values: Vec<f64>,
     basis: FreeSpan,
 }
@@ -110,22 +109,19 @@ pub(super) struct PhaseFound {
     second: f64,
 }
 
+/// About `most` of the rows.
+pub(super) fn thinned<'r>(rows: impl Iterator<Item = &'r Row> + Clone, most: usize) -> Vec<&'r Row> {
+    let every = rows.clone().count().div_ceil(most).max(1);
+    rows.step_by(every).collect()
+}
+
 impl<'a> PhaseSearch<'a> {
-    /// Of about `most` of the rows, with a `value` of each, arcsec.
-    pub(super) fn new<'r>(
-        says: &'a dyn Fn(&State) -> f64,
-        ratio: f64,
-        (rows, value): (impl Iterator<Item = &'r Row> + Clone, fn(&Row) -> f64),
-        friction_n_m: f64,
-        most: usize,
-    ) -> PhaseSearch<'a> {
-        let every = rows.clone().count().div_ceil(most).max(1);
-        let some: Vec<&Row> = rows.step_by(every).collect();
-        let (at, values): (Vec<State>, Vec<f64>) = some.iter().map(|row| (row.at, value(row))).unzip();
-        let logs = at.iter().map(|at| at.log + 1).max().unwrap_or(0);
-        let heaviest = at.iter().map(|at| at.torque_n_m.abs()).fold(1e-9, f64::max);
+    /// Of these rows.
+    pub(super) fn new(says: &'a dyn Fn(f64) -> Vec<f64>, rows: &[&Row], friction_n_m: f64) -> PhaseSearch<'a> {
+        let logs = rows.iter().map(|row| row.at.log + 1).max().unwrap_or(0);
+        let heaviest = rows.iter().map(|row| row.at.torque_n_m.abs()).fold(1e-9, f64::max);
         let flank = |at: &State| if at.torque_n_m.abs() > friction_n_m { at.torque_n_m.signum() } else { -at.way };
-        let column = |of: &dyn Fn(&State) -> f64| at.iter().map(of).collect::<Vec<f64>>();
+        let column = |of: &dyn Fn(&State) -> f64| rows.iter().map(|row| of(&row.at)).collect::<Vec<f64>>();
         let zeros = (0..logs).map(|log| column(&|at| f64::from(at.log == log)));
         let others = [
             column(&|at| at.torque_n_m / heaviest),
@@ -134,18 +130,13 @@ impl<'a> PhaseSearch<'a> {
             column(&flank),
         ];
         let basis = FreeSpan::default().beyond(zeros.chain(others));
-        PhaseSearch { says, ratio, at, values, basis }
+        PhaseSearch { says, values: rows.iter().map(|row| row.measured_arcsec).collect(), basis }
     }
 
     /// Residual with a phase, arcsec.
     fn left(&self, zero_rad: f64) -> Vec<f64> {
-        let turned = |at: &State| State {
-            generator_rad: at.generator_rad - zero_rad,
-            output_rad: at.output_rad - zero_rad / self.ratio,
-            ..*at
-        };
-        let left = |(at, value): (&State, &f64)| value - (self.says)(&turned(at));
-        self.basis.freed(self.at.iter().zip(&self.values).map(left).collect())
+        let says = (self.says)(zero_rad);
+        self.basis.freed(self.values.iter().zip(says).map(|(value, says)| value - says).collect())
     }
 
     /// Their sum of squares, arcsec².
@@ -181,7 +172,7 @@ impl<'a> PhaseSearch<'a> {
         let without = |begin: usize, end: usize| {
             vertex(three.each_ref().map(|left| dot(left, left) - dot(&left[begin..end], &left[begin..end])))
         };
-        let (rows, size) = (self.at.len(), self.at.len().div_ceil(BLOCKS).max(1));
+        let (rows, size) = (self.values.len(), self.values.len().div_ceil(BLOCKS).max(1));
         let blocks: Vec<f64> = (0..rows).step_by(size).map(|begin| without(begin, (begin + size).min(rows))).collect();
         [zero_rad + without(0, 0) * step, jackknife(&blocks) * step]
     }
@@ -200,19 +191,19 @@ fn vertex([before, at, after]: [f64; 3]) -> f64 {
 
 /// Finds the phase of a table against logs.
 pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignment {
-    let says = |at: &State| steady(table, at, 0.0);
-    let ratio = table.drive().exact_ratio();
-    let of =
-        |most: usize| PhaseSearch::new(&says, ratio, (rows.rows.iter(), |row| row.measured_arcsec), friction_n_m, most);
+    let [looked_at, found_with] = [LOOKED_AT, FOUND_WITH].map(|most| thinned(rows.rows.iter(), most));
+    let says = |rows: &[&Row], zero: f64| rows.iter().map(|row| steady(table, &row.at, zero)).collect::<Vec<f64>>();
+    let (of_some, of_all) = (|zero| says(&looked_at, zero), |zero| says(&found_with, zero));
     let repeats = repeats(table);
     let pitch = TAU / f64::from(table.drive().ripple_order());
     let fine_step = pitch / STEPS_OF_A_PITCH as f64;
     let coarse_step = if repeats <= pitch * 1.001 { fine_step } else { TAU / STEPS_OF_A_TURN as f64 };
-    let PhaseFound { zero_rad: best, least, usual, second } = of(LOOKED_AT).found(repeats, coarse_step, fine_step);
-    let all = of(FOUND_WITH);
+    let some = PhaseSearch::new(&of_some, &looked_at, friction_n_m);
+    let PhaseFound { zero_rad: best, least, usual, second } = some.found(repeats, coarse_step, fine_step);
+    let all = PhaseSearch::new(&of_all, &found_with, friction_n_m);
     let step = if least < usual * (1.0 - LEAST_GAIN) { fine_step } else { coarse_step };
     let [zero, std] = all.close_to(best, step);
-    let rms = |zero: f64| (all.squares(zero) / all.at.len() as f64).sqrt();
+    let rms = |zero: f64| (all.squares(zero) / found_with.len() as f64).sqrt();
     let gain = 1.0 - least / usual.max(f64::MIN_POSITIVE);
     let flat = gain < LEAST_GAIN;
     let doubtful = !flat && second < least * (1.0 + LEAST_BEFORE_SECOND);
