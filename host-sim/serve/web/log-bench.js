@@ -57,8 +57,8 @@ export async function logBench(view, asked, bench) {
     columns: asked.get("columns"),
     ratio: asked.get("ratio") ?? "",
     known: asked.get("known") ?? "ratio",
-    stiffness: asked.get("stiffness") ?? "20000",
-    backlash: asked.get("backlash") ?? "30",
+    stiffness: asked.get("stiffness") ?? "",
+    backlash: asked.get("backlash") ?? "",
     teeth: asked.get("teeth") ?? "",
     without: new Set(asked.getAll("without")),
   };
@@ -68,7 +68,7 @@ export async function logBench(view, asked, bench) {
     ...(now.ratio ? [["ratio", now.ratio]] : []),
     ["known", now.known],
     ...(now.known === "ratio"
-      ? [["stiffness", now.stiffness], ["backlash", now.backlash], ...(now.teeth ? [["teeth", now.teeth]] : [])]
+      ? ["stiffness", "backlash", "teeth"].filter((key) => now[key]).map((key) => [key, now[key]])
       : []),
     ...[...now.without].map((cause) => ["without", cause]),
   ];
@@ -357,7 +357,7 @@ export async function logBench(view, asked, bench) {
       input("backlash", "Backlash, arcsec", "backlash"),
       input("teeth", "Teeth of the flexspline, if known", "teeth"),
       el("small", {
-        text: "Stiffness and backlash are guesses until you put in your catalogue's figures; they count where a torque was recorded. With the number of teeth (ratio 100: 200) causes in the teeth are considered too.",
+        text: "Names of causes depend on stiffness (where a torque was recorded) and backlash; the table needs neither. With the number of teeth (ratio 100: 200) causes in the teeth are considered too.",
       }),
     );
     numbers.hidden = now.known !== "ratio";
@@ -386,7 +386,14 @@ export async function logBench(view, asked, bench) {
     );
   }
 
-  /** The model of the figures, a file of the folder as any other. */
+  /** The catalogue's figures that a verdict would have to guess. */
+  const missing = () =>
+    [
+      ["stiffness", chosen.some((c) => c.role === "torque") && !Number(now.stiffness)],
+      ["backlash", now.backlash === ""],
+    ].filter(([, lacks]) => now.known === "ratio" && lacks);
+
+  /** The model of the figures, a file of the folder as any other; without a torque no stiffness is read. */
   async function modelOfFigures() {
     const teeth = Number(now.teeth);
     let drive = `ratio = ${Number(now.ratio)}`;
@@ -402,7 +409,7 @@ export async function logBench(view, asked, bench) {
 [drive]
 ${drive}
 [nominal]
-stiffness_n_m_per_rad = ${Number(now.stiffness)}
+stiffness_n_m_per_rad = ${Number(now.stiffness) || 1e6}
 backlash_arcsec = ${Number(now.backlash)}
 `;
     return sendFile("nominal-bench.toml", new Blob([text]));
@@ -431,11 +438,18 @@ backlash_arcsec = ${Number(now.backlash)}
     };
     calibrated.classList.add("waits");
     if (!calibrated.hasChildNodes()) calibrated.append(el("p", { text: "Made after the verdict." }));
-    const judged = diagnose(at, reading, begun).catch(failed(verdict));
+    const lacks = missing().map(([name]) => name);
+    if (lacks.length) {
+      verdict.replaceChildren(
+        el("p", { text: `Put in the ${lacks.join(" and ")} of the catalogue above: names of causes depend on it.` }),
+      );
+    }
+    const judged = lacks.length ? undefined : diagnose(at, reading, begun).catch(failed(verdict));
     if (looked.rows <= SHORT_LOG) await judged;
     if (at !== round) return;
     await Promise.all([judged, calibrate(at, reading).catch(failed(calibrated))]);
-    if (at === round && now.files.length > 1) await others(at, reading).catch((error) => bench.complain(error));
+    if (at === round && now.files.length > 1 && !lacks.length)
+      await others(at, reading).catch((error) => bench.complain(error));
   }
 
   /** The verdict of every other log in turn, and two of them over one another. */
@@ -497,7 +511,7 @@ backlash_arcsec = ${Number(now.backlash)}
         ? { model: name }
         : kind === "tables"
           ? { tables: name }
-          : Number(now.teeth)
+          : Number(now.teeth) && !missing().length
             ? { model: await modelOfFigures() }
             : { ratio: Number(now.ratio) };
     const work = { work: "calibrate", files: now.files, reading, known, generator: "cam" };
