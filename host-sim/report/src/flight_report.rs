@@ -8,7 +8,7 @@ use super::page::{
     ChartAxis, ChartSeries, Choice, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
     Status, Upright,
 };
-use flexspline_fly::fly::{ByController, Flown, LEAST_PHASE_MARGIN_DEG, Results, spectrum};
+use flexspline_fly::fly::{ByController, Flown, LEAST_PHASE_MARGIN_DEG, Results, settles_in, spectrum};
 
 /// The page; `command` is the line that made it.
 #[must_use]
@@ -74,7 +74,7 @@ fn tracking(flight: &Flight, results: &Results) -> PageSection {
             RichText::arcsec(rms, 3),
             RichText::arcsec(largest, 3),
             if ripple.is_finite() { format!("{ripple:.1} ″/s").into() } else { "–".into() },
-            settles.map_or("–".into(), |seconds| format!("{:.2} s", seconds[k]).into()),
+            settles.map_or("–".into(), |seconds| settles_in(seconds[k]).into()),
         ]
     };
     let caption = "Output less target; speed of the output less the target's while that is even; time to settle after \

@@ -11,7 +11,7 @@ use super::{Failure, bad_file, bad_input, report};
 use flexspline_base::figures;
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
-use flexspline_fly::fly::{ByController, Flown, Results, SCENARIOS, built_in, example, read, results};
+use flexspline_fly::fly::{ByController, Flown, Results, SCENARIOS, built_in, example, read, results, settles_in};
 use flexspline_report::flight_report;
 
 /// Fly a joint with mass in closed loop: motor, servo, drive, friction, load and wind; with and without compensation
@@ -115,14 +115,14 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         "rms ″",
         "max ″",
         "ripple ″/s",
-        "settles s"
+        "settles in"
     );
     let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(ByController::all);
     let settles = results.settle_s.as_ref().map(ByController::all);
     for (k, name) in flexspline_motion::flight::CONTROLLERS.iter().enumerate() {
         let [rms, max, ripple] = columns.map(|column| column[k]);
         let ripple = if ripple.is_finite() { format!("{ripple:.1}") } else { "–".to_owned() };
-        let settles = settles.map_or_else(|| "–".to_owned(), |seconds| format!("{:.2}", seconds[k]));
+        let settles = settles.map_or_else(|| "–".to_owned(), |seconds| settles_in(seconds[k]));
         let _ = writeln!(text, "{:22}{rms:10.2}{max:10.2}{ripple:>14}{settles:>12}", name.replace('_', " "));
     }
     text += &figures::lines(&results.figures());

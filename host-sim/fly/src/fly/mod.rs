@@ -21,7 +21,7 @@ pub use built_in::{SCENARIOS, built_in};
 pub use error::FlyError;
 pub use file::{example, read};
 pub use own::{OwnDrive, OwnTableError, gear_at};
-pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, spectrum};
+pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, settles_in, spectrum};
 
 /// A scenario, and what flies it.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,6 +12,12 @@ use flexspline_base::figures::NamedFigure;
 
 use super::file::name_of;
 
+/// A time to settle for a reader; an output that was settled all along never left.
+#[must_use]
+pub fn settles_in(seconds: f64) -> String {
+    if seconds == 0.0 { "never left".to_owned() } else { format!("{seconds:.2} s") }
+}
+
 /// Output less target within this of where it ends counts as settled, arcsec.
 const SETTLED_ARCSEC: f64 = 2.0;
 /// Least phase margin, degrees, and least distance of the open loop from −1 of a servo that is sound: the lower ends
