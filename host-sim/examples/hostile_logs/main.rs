@@ -116,7 +116,7 @@ impl Bench {
             Ok(done) => done,
             Err(error) => return refused(error),
         };
-        match done.extend(&self.subject, &options, || {}) {
+        match done.extend(&self.subject, &options) {
             Ok(made) => match serde_json::to_string(&done.file(&made.extension, "")) {
                 Ok(_) => (0, done.diagnosis.finding.words().to_owned()),
                 Err(error) => (101, error.to_string()),

@@ -173,7 +173,7 @@ pub fn diagnose<'py>(
         let options = Options { asked, ..Options::default() };
         let tell = |done: usize, of: usize, what: &str| watch.tell_or_unwind(done, of, what.to_owned());
         let done = diagnose_rows(recording.map_err(failed)?, &subject, &options, tell).map_err(failed)?;
-        let made = done.extend(&subject, &options, || tell(4, 5, "FEM of the extended drive")).map_err(failed)?;
+        let made = done.extend(&subject, &options).map_err(failed)?;
         let files = made.table_files().into_iter().map(|(name, _)| name).collect::<Vec<_>>();
         let mut extension = made.extension;
         // As the command lists what it writes.

@@ -103,13 +103,7 @@ impl Diagnose {
         let done = diagnose_rows(recording, &subject, &options, |done, of, what| progress.set(done, of, what))
             .map_err(failed)?;
         drop(progress);
-        let mut progress = None;
-        let begins = || {
-            let bar = progress.insert(context.progress("FEM of the extended drive"));
-            bar.set(0, 1, "a few places on either flank");
-        };
-        let mut made = done.extend(&subject, &options, begins).map_err(failed)?;
-        drop(progress);
+        let mut made = done.extend(&subject, &options).map_err(failed)?;
         let mut outputs = Outputs::new();
         self.write(context, &mut made, out, &mut outputs)?;
         let Diagnosed { recording, diagnosis, extended, .. } = &done;
@@ -248,13 +242,6 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     if !diagnosis.causes.is_empty() {
         for field in &extension.drive_fields {
             let _ = writeln!(text, "extended drive: {field}");
-        }
-        if let Some(agreement) = &extension.fem_agreement {
-            let _ = writeln!(
-                text,
-                "FEM of the extended drive: {:.2} arcsec rms from the causes found, of {:.2}",
-                agreement.difference_rms_arcsec, agreement.found_rms_arcsec
-            );
         }
     }
     let mut files = vec!["diagnosis.json".to_owned()];

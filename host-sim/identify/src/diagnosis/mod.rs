@@ -56,7 +56,7 @@ use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
 pub use explain::Explanation;
 pub(crate) use extended::nominal_arcsec;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
-use model::{Problem, Term, terms_at};
+use model::{Problem, Term, among_each_other, terms_at};
 use noise::Noise;
 pub use pipeline::{
     Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, WrittenTable, diagnose_rows,
@@ -163,7 +163,6 @@ pub(crate) fn diagnose_extended(
     let noise = problem.fineness.noise;
     let terms = terms_at(problem, &search.laws, &search.start);
     let selected = Selected::of(problem, terms).ok_or(DiagnosisError::NotFinite)?;
-    let mut start = remembered(&search.laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(problem, &selected, &maps, noise.white);
     let fast = search.fast.iter();
@@ -183,11 +182,10 @@ pub(crate) fn diagnose_extended(
         .map(|thinned| (thinned.problem(&on, &problem.uncertain, problem.fineness), thinned.share));
     let mut diagnosis = verdict::conclude(&search, &selected, &on_sample, left, settings, trace);
     diagnosis.set_aside = prepare::too_few_left(problem, diagnosis.finding);
-    drop(selected);
     let is_named = |cause: CauseName| diagnosis.causes.iter().any(|named| named.name == cause);
-    start.retain(|(law, _)| search.laws[*law].cause().is_none_or(is_named));
-    let Search { problem, laws, .. } = search;
-    let extended = Extended::of(&problem, laws, &start).ok_or(DiagnosisError::NotFinite)?;
+    let kept = selected.terms.into_iter().filter(|term| term.law.cause().is_none_or(is_named)).collect();
+    let selected = Selected::of(problem, among_each_other(problem, kept)).ok_or(DiagnosisError::NotFinite)?;
+    let extended = Extended::of(problem, &selected).ok_or(DiagnosisError::NotFinite)?;
     Ok((diagnosis, extended))
 }
 

@@ -24,8 +24,8 @@ use super::{channels, torque_zero, zeros};
 use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrate, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
-    CauseEntry, Evaluation, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError, TableKind,
-    TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry, less,
+    CauseEntry, Evaluation, ExtendedTables, FoundGeometry, Model, Remake, RemakeError, TableKind, TableSubject,
+    causes_to_toml, evaluate, found_geometry, less,
 };
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, least_and_most,
@@ -37,7 +37,6 @@ use flexspline_design::kernels::Kernels;
 use flexspline_design::tables::{MadeTable, TableError, c_header, rust_source};
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 
 /// Rows that are diagnosed at most. *Chosen* for the memory that they take, 1.5 GB.
 const MOST_ROWS: usize = 1_000_000;
@@ -45,10 +44,6 @@ const MOST_ROWS: usize = 1_000_000;
 /// Advice where an error leaps so often that no row counts.
 const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of \
                                 this drive; record it under a load that keeps one flank";
-
-/// The causes found are shapes of an extended drive if its FEM differs from them by less than this share of them.
-/// *Guess*: beyond, half of the cause has another shape.
-const WORST_AGREEMENT: f64 = 0.5;
 
 /// Why a file was not diagnosed, or what was found not extended.
 #[derive(Debug, Error)]
@@ -96,9 +91,6 @@ pub enum PipelineError {
     /// The causes make no drive.
     #[error("the causes make no drive: {0}")]
     NoDrive(#[from] DriveError),
-    /// The FEM of the extended drive does not converge.
-    #[error("the FEM of the extended drive: {0}")]
-    Fem(#[from] SolveError),
     /// No table was made by FEM.
     #[error(transparent)]
     Remake(RemakeError),
@@ -120,7 +112,6 @@ impl PipelineError {
         match self {
             PipelineError::Calibration(error) => error.is_bad_input(),
             PipelineError::NoDrive(_)
-            | PipelineError::Fem(_)
             | PipelineError::Remake(_)
             | PipelineError::Table(_)
             | PipelineError::Wheels(_) => false,
@@ -414,7 +405,7 @@ pub fn diagnose_rows(
     let remake: Option<&Remake<'_>> = if options.remake.is_some() { Some(&remake) } else { None };
     let rows = [&recording, measured.as_ref().unwrap_or(&recording)];
     let (found, prior) = ((&extended, causes.as_slice()), subject.prior(known.as_ref()));
-    let evaluation = evaluate(rows, found, &tables, &prior, &settings, remake)?;
+    let evaluation = evaluate(rows, found, &tables, &prior, remake)?;
     diagnosis.compensated(&evaluation);
     Ok(Diagnosed { recording, diagnosis, extended, known_table, evaluation })
 }
@@ -463,9 +454,6 @@ pub struct Extension {
     pub tables_by_fem: bool,
     /// Fields of the drive that hold causes.
     pub drive_fields: Vec<String>,
-    /// What the FEM of that drive says.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fem_agreement: Option<FemAgreement>,
     /// Causes that stand in `[extension]` of drive-extended.toml.
     pub named_causes: Vec<CauseName>,
     /// Compensation by session held out, and which causes are in the tables.
@@ -525,16 +513,11 @@ impl Diagnosed {
     }
 
     /// Makes the extended drive where causes were found, and the table that leaves least in rows left out, if one
-    /// gains. `by_fem` is called before the FEM of the drive begins.
+    /// gains.
     ///
     /// # Errors
-    /// The causes make no drive; the FEM of it does not converge.
-    pub fn extend(
-        &self,
-        subject: &Subject<'_>,
-        options: &Options<'_>,
-        by_fem: impl FnOnce(),
-    ) -> Result<Made, PipelineError> {
+    /// The causes make no drive; no table of it is made.
+    pub fn extend(&self, subject: &Subject<'_>, options: &Options<'_>) -> Result<Made, PipelineError> {
         let evaluation = &self.evaluation;
         let mut extension = Extension { compensation: Some(evaluation.clone()), ..Extension::default() };
         let table_subject = subject.table_subject();
@@ -548,8 +531,11 @@ impl Diagnosed {
             extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
             drive_toml = Some(model.to_toml());
         } else if !self.diagnosis.causes.is_empty() {
-            let found = self.geometry(subject, &tables, options, by_fem, &mut extension)?;
-            extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
+            let entry = |cause: &Cause| CauseEntry::of(cause.name, &cause.parameters);
+            let causes: Vec<CauseEntry> = self.diagnosis.causes.iter().map(entry).collect();
+            let orientation_rad = tables.orientation_rad;
+            let found = found_geometry(&subject.drive, &self.extended, &causes, subject.against(), orientation_rad)?;
+            extension.drive_fields.clone_from(&found.fields);
             extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
             if let Some(make) = options.remake.filter(|_| gain.iter().any(|(kind, _)| *kind == TableKind::Extended)) {
                 by_drive = remade(make, subject, &found, options.mesh).map_err(PipelineError::Remake)?;
@@ -603,40 +589,6 @@ impl Diagnosed {
         let known = self.known_table.as_ref().map(|made| Table::check(&made.image)).transpose();
         let known = known.map_err(PipelineError::Image)?;
         Ok(calibrate(&[recording], &subject.prior(known.as_ref()))?.table)
-    }
-
-    /// The drive with the causes that are geometry, as far as the FEM bears them out.
-    fn geometry(
-        &self,
-        subject: &Subject<'_>,
-        tables: &ExtendedTables<'_>,
-        options: &Options<'_>,
-        by_fem: impl FnOnce(),
-        extension: &mut Extension,
-    ) -> Result<FoundGeometry, PipelineError> {
-        let of = subject.against();
-        let entry = |cause: &Cause| CauseEntry::of(cause.name, &cause.parameters);
-        let causes: Vec<CauseEntry> = self.diagnosis.causes.iter().map(entry).collect();
-        let found = found_geometry(&subject.drive, &self.extended, &causes, of, tables.orientation_rad)?;
-        if !found.mapped.iter().any(|mapped| mapped.by_angle) {
-            return Ok(found);
-        }
-        by_fem();
-        let settings =
-            SolverSettings { method: Method::Fast, mesh: subject.mesh(options.mesh), ..SolverSettings::default() };
-        let drives = (&subject.drive, &found);
-        let agreement = check_by_fem(drives, subject.kind, settings, &self.extended, of, tables.orientation_rad)?;
-        extension.fem_agreement = Some(agreement);
-        if agreement.difference_rms_arcsec < WORST_AGREEMENT * agreement.found_rms_arcsec {
-            return Ok(found);
-        }
-        // The FEM of such a drive does something else: the causes are kept by name, not as a shape that is not theirs.
-        let (shapes, others): (Vec<CauseEntry>, Vec<CauseEntry>) = causes
-            .into_iter()
-            .partition(|cause| found.mapped.iter().any(|mapped| mapped.by_angle && mapped.cause == cause.name));
-        let mut without = found_geometry(&subject.drive, &self.extended, &others, of, tables.orientation_rad)?;
-        without.rest.splice(0..0, shapes);
-        Ok(without)
     }
 }
 

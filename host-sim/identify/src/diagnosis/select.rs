@@ -11,7 +11,6 @@ use super::held_out::own_zero;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other, but};
 use super::thresholds::selection::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
-use crate::causes::CauseName;
 use crate::linear::Solution;
 
 /// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are dropped
@@ -405,41 +404,6 @@ fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
 /// By how much the laws of terms may be wrong as something that `law` describes, arcsec.
 pub(super) fn misfit_as<'t, 'l: 't>(law: &Law, terms: impl IntoIterator<Item = (&'t Term<'l>, &'t Standing)>) -> f64 {
     terms.into_iter().map(|(term, standing)| standing.size * term.law.misfit_as(law)).fold(0.0, f64::max)
-}
-
-/// The given causes, each by the law of it that explains the data best with the others.
-#[must_use]
-pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -> Vec<Term<'l>> {
-    let mut terms: Vec<Term<'l>> = Vec::new();
-    // Each round takes one law.
-    for _ in 0..laws.len() {
-        let open: Vec<&Law> = laws
-            .iter()
-            .filter(|law| {
-                law.cause().is_some_and(|cause| causes.contains(&cause))
-                    && terms.iter().all(|t| t.law.label != law.label)
-            })
-            .collect();
-        let scaffold = Scaffold::new(problem, &terms);
-        let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
-        let found = best_tried(&scaffold, &open, tried, usize::MAX).0;
-        let best = found
-            .into_par_iter()
-            .with_max_len(1)
-            .filter_map(|term| {
-                let (term, fit) = scaffold.refine(term)?;
-                Some((sound(&term, fit.last()), fit.solution.evidence, term))
-            })
-            .max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let Some((_, _, term)) = best else { break };
-        terms.push(term);
-        for _ in 0..2 {
-            let Some(selected) = Selected::of(problem, terms.clone()) else { return terms };
-            let Some(settled) = settle(problem, selected) else { break };
-            terms = settled.terms;
-        }
-    }
-    terms
 }
 
 /// Refines each term with the others held, if there are others.

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::sampled::ExtendedTables;
 use crate::calibrate::{LEAST_GAIN, Prior, calibrate};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
-use crate::diagnosis::{Compensation, Extended, PipelineError, Series, Settings};
+use crate::diagnosis::{Compensation, Extended, PipelineError, Series};
 use crate::measurement::{Recording, Session, rms};
 use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -166,12 +166,11 @@ pub fn evaluate(
     (found, causes): (&Extended, &[CauseName]),
     tables: &ExtendedTables<'_>,
     prior: &Prior<'_>,
-    settings: &Settings<'_>,
     remake: Option<&Remake<'_>>,
 ) -> Result<Evaluation, PipelineError> {
     let (sessions, used) = split(&recording.sessions);
     let (nominal, mut evaluation) = (tables.nominal, Evaluation::default());
-    let fit = || Extended::fit_to(&sessions, &used, nominal, tables.table, causes, (settings, found.fineness));
+    let fit = || found.fit_to(&sessions, &used, nominal, tables.table);
     let fitted = if causes.is_empty() { None } else { Some(fit()) };
     let fitted = fitted.and_then(|fitted| fitted.map_err(|why| evaluation.not_made.push(why.to_string())).ok());
     let fitted = fitted.as_ref();

@@ -339,14 +339,15 @@ fn beside(values: Vec<f64>, share: f64) -> Regressor {
 /// A parameter for the report: name and value.
 pub(crate) type Named = (ParameterName, f64);
 
-type MakeColumns = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync>;
-type MakeParameters = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
-type IsPhysical = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync>;
-type AddedLoad = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync>;
-type Apart = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync>;
-type Beginnings = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync>;
+type MakeColumns = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync>;
+type MakeParameters = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
+type IsPhysical = Arc<dyn Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync>;
+type AddedLoad = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync>;
+type Apart = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync>;
+type Beginnings = Arc<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync>;
 
 /// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
+#[derive(Clone)]
 pub(crate) struct Lead {
     columns: MakeColumns,
     beginnings: Beginnings,
@@ -357,6 +358,7 @@ static LAWS: AtomicU64 = AtomicU64::new(0);
 
 /// One law of one cause: what it is about, how it is evaluated, how it may be wrong, how it is looked for, and how it
 /// acts on others.
+#[derive(Clone)]
 pub(crate) struct Law {
     id: u64,
     /// Its subject.
@@ -399,7 +401,7 @@ pub struct Wrong {
 }
 
 /// How a law is looked for.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Search {
     /// Where to begin.
     pub lead: Option<Lead>,
@@ -413,7 +415,7 @@ pub(crate) struct Search {
 }
 
 /// How a law acts on other causes, and they on it.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Acts {
     /// Load (N·m, row by row) that the cause adds to the torque that was recorded.
     load: Option<AddedLoad>,
@@ -454,9 +456,9 @@ impl Law {
             label,
             variant: Cow::Borrowed(""),
             shapes: Vec::new(),
-            columns: Box::new(columns),
-            parameters: Box::new(|_, _, _| Vec::new()),
-            physical: Box::new(|_, _| true),
+            columns: Arc::new(columns),
+            parameters: Arc::new(|_, _, _| Vec::new()),
+            physical: Arc::new(|_, _| true),
             smooth: false,
             wrong: Wrong {
                 misfit: USUAL_MISFIT,
@@ -547,22 +549,22 @@ impl Law {
         mut self,
         parameters: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync + 'static,
     ) -> Law {
-        self.parameters = Box::new(parameters);
+        self.parameters = Arc::new(parameters);
         self
     }
     fn physical_if(mut self, physical: impl Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync + 'static) -> Law {
-        self.physical = Box::new(physical);
+        self.physical = Arc::new(physical);
         self
     }
     fn adds_load(mut self, load: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync + 'static) -> Law {
-        self.acts.load = Some(Box::new(load));
+        self.acts.load = Some(Arc::new(load));
         self
     }
     fn parts_zones(
         mut self,
         apart: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync + 'static,
     ) -> Law {
-        self.acts.zones = Some(Box::new(apart));
+        self.acts.zones = Some(Arc::new(apart));
         self
     }
     fn led_by(
@@ -570,7 +572,7 @@ impl Law {
         columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync + 'static,
         beginnings: impl Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync + 'static,
     ) -> Law {
-        self.search.lead = Some(Lead { columns: Box::new(columns), beginnings: Box::new(beginnings) });
+        self.search.lead = Some(Lead { columns: Arc::new(columns), beginnings: Arc::new(beginnings) });
         self
     }
 
