@@ -119,13 +119,13 @@
 //! # Name what the simulation gets wrong
 //!
 //! ```
-//! use flexspline_sim::{ColumnMap, Drive, GeneratorKind, Model, Options, Subject, diagnose, read_rows};
+//! use flexspline_sim::{ColumnMap, Drive, GeneratorKind, Model, Settings, Subject, diagnose, read_rows};
 //!
 //! let model = Model::read("../examples/csf17_100/nominal.toml".as_ref())?;
 //! let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
 //! let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! let rows = read_rows("../examples/csf17_100/error_vs_input.csv".as_ref(), &columns, &subject)?;
-//! let diagnosed = diagnose(rows, &subject, &Options::default(), |_, _, _| ())?;
+//! let diagnosed = diagnose(rows, &subject, &Settings::default(), |_, _, _| ())?;
 //! // 2.5 turns of the generator cannot say which wheel it is.
 //! assert!(diagnosed.diagnosis.causes.is_empty());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -202,7 +202,7 @@ pub use flexspline_identify::residual::Picture;
 pub use flexspline_identify::calibrate::{Calibrated, Calibration, CalibrationError, Prior, calibrate};
 pub use flexspline_identify::causes::CauseName;
 pub use flexspline_identify::diagnosis::{
-    Diagnosed, Diagnosis, Explanation, Options, PipelineError, Subject, diagnose_rows as diagnose, parse_rows,
+    Diagnosed, Diagnosis, Explanation, PipelineError, Settings, Subject, diagnose_rows as diagnose, parse_rows,
     read_rows,
 };
 pub use flexspline_identify::extension::{Model, left_by_core};

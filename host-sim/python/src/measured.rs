@@ -8,7 +8,7 @@ use flexspline_design::kernels::Kernels;
 use flexspline_identify::calibrate::{CalibrationError, Prior, calibrate as fit};
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::{
-    Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows, read_rows,
+    Explanation, PipelineError, Series, Settings, Subject, diagnose_rows, parse_rows, read_rows,
 };
 use flexspline_identify::extension::Model;
 use flexspline_identify::known_rows::{parse_known, read_known};
@@ -170,10 +170,10 @@ pub fn diagnose<'py>(
             LogFrom::File(path) => read_rows(path, &map, &subject),
             LogFrom::Memory((name, bytes)) => parse_rows(name, bytes, &map, &subject),
         };
-        let options = Options { asked, ..Options::default() };
+        let options = Settings { asked, ..Settings::default() };
         let tell = |done: usize, of: usize, what: &str| watch.tell_or_unwind(done, of, what.to_owned());
         let done = diagnose_rows(recording.map_err(failed)?, &subject, &options, tell).map_err(failed)?;
-        let made = done.extend(&subject, &options).map_err(failed)?;
+        let made = done.extend(&subject).map_err(failed)?;
         let files = made.table_files().into_iter().map(|(name, _)| name).collect::<Vec<_>>();
         let mut extension = made.extension;
         // As the command lists what it writes.

@@ -59,8 +59,8 @@ pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
 use model::{Problem, Term, among_each_other, terms_at};
 use noise::Noise;
 pub use pipeline::{
-    Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, WrittenTable, diagnose_rows,
-    parse_rows, read_rows,
+    Diagnosed, DiagnosisFile, Extension, Made, PipelineError, Subject, WrittenTable, diagnose_rows, parse_rows,
+    read_rows,
 };
 use prepare::FreeColumns;
 
@@ -92,8 +92,6 @@ pub enum DiagnosisError {
 pub struct Settings<'a> {
     /// Radius of the pitch circle of the output, mm: turns arc-seconds into micrometres.
     pub pitch_radius_mm: f64,
-    /// Averages of rows that fits are made on, about.
-    pub averages: usize,
     /// Says on stderr what is tried.
     pub verbose: bool,
     /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
@@ -115,12 +113,14 @@ pub struct Fineness {
 
 impl Default for Settings<'_> {
     fn default() -> Self {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, without: &[] }
+        Settings { pitch_radius_mm: 48.7, verbose: false, asked: None, without: &[] }
     }
 }
 
 /// Rows needed at least. *Guess*: several for each of some dozen columns.
 pub(crate) const LEAST_ROWS: usize = 200;
+/// Averages of rows that fits are made on, about.
+const AVERAGES: usize = 12_000;
 /// Times that causes are chosen again, at most.
 const MOST_ROUNDS: usize = 2;
 /// Diagnoses sessions against a nominal model, or against a table of the FEM that takes its place in the prediction.
@@ -228,7 +228,7 @@ impl<'a> Search<'a> {
             }
         }
         // Rows to an average that leave about as many averages as asked for, unless they hide something.
-        let usual = (on.rows.count_used() / settings.averages).max(1);
+        let usual = (on.rows.count_used() / AVERAGES).max(1);
         let (mut stride, mut free): (usize, Option<FreeColumns>) = (usual, None);
         let (mut hung, mut explained) = (vec![false; on.rows.len()], vec![0.0; on.rows.len()]);
         let mut uncertain = prepare::uncertain(on, &[], &hung);

@@ -533,7 +533,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let scales = super::LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
         let on = super::Excitation::new(&rows, &drive, &base, &scales);
         let uncertain = super::prepare::uncertain(&on, &[], &[]);
-        let usual = rows.count_used() / settings.averages;
+        let usual = rows.count_used() / super::AVERAGES;
         let hidden = super::hidden_by_averages(&on, &super::library(&on), &uncertain, usual, &[]);
         if hidden.is_some() { 1 } else { usual }
     };
