@@ -78,7 +78,7 @@
 //! ```
 //! use flexspline_sim::{look, raw};
 //!
-//! let looked = look(&[raw::parse("joint3.csv", &std::fs::read("../examples/lara8/joint3.csv")?)?])?;
+//! let looked = look(&[raw::parse("joint3.csv", std::fs::read("../examples/lara8/joint3.csv")?)?])?;
 //! assert_eq!(looked.ratio_proposed, Some(101.0));
 //! assert!(looked.columns_option.unwrap().contains("generator=encoder_motorinc_3"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -92,7 +92,7 @@
 //! # let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! # let file = "../examples/csf17_100/error_vs_input.csv";
 //!
-//! let log = parse_log(file, &std::fs::read(file)?, &columns, &Gear::of_ratio(100.0))?;
+//! let log = parse_log(file, std::fs::read(file)?, &columns, &Gear::of_ratio(100.0))?;
 //! let model = "../examples/csf17_100/nominal.toml";
 //! let nominal = Nominal::from_toml(model, &std::fs::read_to_string(model)?)?;
 //! let rows = Rows::new(&log.sessions, &nominal);
@@ -110,7 +110,7 @@
 //!
 //! let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! let file = "../examples/csf17_100/error_vs_input.csv";
-//! let log = parse_log(file, &std::fs::read(file)?, &columns, &Gear::of_ratio(100.0))?;
+//! let log = parse_log(file, std::fs::read(file)?, &columns, &Gear::of_ratio(100.0))?;
 //! let made = calibrate(&[log], &Prior::of_ratio(100.0, GeneratorKind::Cam))?;
 //! assert!(made.calibration.core.rms_after_arcsec < 0.4 * made.calibration.core.rms_before_arcsec);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -119,14 +119,14 @@
 //! # Name what the simulation gets wrong
 //!
 //! ```
-//! use flexspline_sim::{ColumnMap, Drive, GeneratorKind, Model, Options, Subject, diagnose, parse_rows};
+//! use flexspline_sim::{ColumnMap, Drive, GeneratorKind, Model, Settings, Subject, diagnose, parse_rows};
 //!
 //! let model = Model::read("../examples/csf17_100/nominal.toml".as_ref())?;
 //! let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
 //! let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! let log = std::fs::read("../examples/csf17_100/error_vs_input.csv")?;
-//! let rows = parse_rows("error_vs_input.csv", &log, &columns, &subject)?;
-//! let diagnosed = diagnose(rows, &subject, &Options::default(), |_, _, _| ())?;
+//! let rows = parse_rows("error_vs_input.csv", log, &columns, &subject)?;
+//! let diagnosed = diagnose(rows, &subject, &Settings::default(), |_, _, _| ())?;
 //! // 2.5 turns of the generator cannot say which wheel it is.
 //! assert!(diagnosed.diagnosis.causes.is_empty());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -203,7 +203,7 @@ pub use flexspline_identify::residual::Picture;
 pub use flexspline_identify::calibrate::{Calibrated, Calibration, CalibrationError, Prior, calibrate};
 pub use flexspline_identify::causes::CauseName;
 pub use flexspline_identify::diagnosis::{
-    Diagnosed, Diagnosis, Explanation, Options, PipelineError, Subject, diagnose_rows as diagnose, parse_rows,
+    Diagnosed, Diagnosis, Explanation, PipelineError, Settings, Subject, diagnose_rows as diagnose, parse_rows,
 };
 pub use flexspline_identify::extension::{Model, left_by_core};
 pub use flexspline_identify::replay::{MeasuredRow, ReplaySummary, ReplayedRow, replay};

@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 
 use flexspline::Table;
 use flexspline_identify::calibrate::{Prior, calibrate};
-use flexspline_identify::diagnosis::{Options, PipelineError, Subject, diagnose_rows, parse_rows};
+use flexspline_identify::diagnosis::{PipelineError, Settings, Subject, diagnose_rows, parse_rows};
 use flexspline_identify::extension::Model;
 use flexspline_identify::look::look;
 use flexspline_identify::measurement::{ColumnMap, parse, raw};
@@ -107,7 +107,7 @@ impl Bench {
 
     fn diagnose(&self, bytes: &[u8]) -> End {
         let refused = |error: PipelineError| (if error.is_bad_input() { 2 } else { 1 }, error.to_string());
-        let options = Options::default();
+        let options = Settings::default();
         let recording = match parse_rows("log.csv", bytes, &ColumnMap::default(), &self.subject) {
             Ok(recording) => recording,
             Err(error) => return refused(error),
@@ -116,7 +116,7 @@ impl Bench {
             Ok(done) => done,
             Err(error) => return refused(error),
         };
-        match done.extend(&self.subject, &options, || {}) {
+        match done.extend(&self.subject) {
             Ok(made) => match serde_json::to_string(&done.file(&made.extension, "")) {
                 Ok(_) => (0, done.diagnosis.finding.words().to_owned()),
                 Err(error) => (101, error.to_string()),

@@ -8,7 +8,9 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
 use flexspline_identify::calibrate::{CalibrationError, Prior, calibrate as fit};
 use flexspline_identify::causes::CauseName;
-use flexspline_identify::diagnosis::{Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows};
+use flexspline_identify::diagnosis::{
+    Explanation, PipelineError, Series, Settings, Subject, diagnose_rows, parse_rows,
+};
 use flexspline_identify::extension::{CauseEntry, Model};
 use flexspline_identify::known_rows::parse_known;
 use flexspline_identify::look::{look as look_at, text};
@@ -231,10 +233,10 @@ pub fn diagnose<'py>(
         };
         let (name, bytes) = log.bytes().map_err(PythonFailure::bad)?;
         let recording = parse_rows(&name, bytes, &map, &subject);
-        let options = Options { asked, ..Options::default() };
+        let options = Settings { asked, ..Settings::default() };
         let tell = |done: usize, of: usize, what: &str| watch.tell_or_unwind(done, of, what.to_owned());
         let done = diagnose_rows(recording.map_err(failed)?, &subject, &options, tell).map_err(failed)?;
-        let made = done.extend(&subject, &options, || tell(4, 5, "FEM of the extended drive")).map_err(failed)?;
+        let made = done.extend(&subject).map_err(failed)?;
         let files = made.table_files().into_iter().map(|(name, _)| name).collect::<Vec<_>>();
         let mut extension = made.extension;
         // As the command lists what it writes.

@@ -7,20 +7,19 @@ use clap::Args;
 
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
-use super::tables::fresh_table;
 use super::{Failure, bad_file, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::kernels::Kernels;
 use flexspline_identify::causes::CauseName;
+use flexspline_identify::diagnosis::Settings;
 use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::pipeline::{
-    Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, parse_rows,
+    Diagnosed, Extension, Made, PipelineError, Subject, diagnose_rows, parse_rows,
 };
 use flexspline_identify::diagnosis::report::{Compensation, Diagnosis};
 use flexspline_identify::extension::{Compensated, Model};
 use flexspline_identify::measurement::{Recording, bytes_of};
-use flexspline_mechanics::drive::{Drive, GeneratorKind};
-use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::drive::GeneratorKind;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///
@@ -36,7 +35,7 @@ Examples:
   flexspline diagnose measured.csv --model nominal.toml
   flexspline diagnose measured.csv --tables out --generator cam
   flexspline diagnose measured.csv --model nominal.toml --explain torsional_hysteresis
-  flexspline diagnose measured.csv --tables out --generator cam --remake-tables --out diagnosed")]
+  flexspline diagnose measured.csv --tables out --generator cam --out diagnosed")]
 pub(super) struct Diagnose {
     /// Measured rows: CSV with a header; columns as --columns says
     #[arg(value_name = "DATA.csv")]
@@ -51,12 +50,6 @@ pub(super) struct Diagnose {
     /// Wave generator whose table is used, and that names the extended one: two-roller, four-roller, double-disc or cam
     #[arg(long, value_name = "G", default_value = "cam")]
     generator: GeneratorKind,
-    /// Make the extended tables by FEM from drive-extended.toml; without it they are sampled from the extended model
-    #[arg(long, requires = "tables")]
-    remake_tables: bool,
-    /// Mesh of FEM runs: coarse, standard or fine [default: that of the table]
-    #[arg(long, value_name = "LEVEL", requires = "tables")]
-    mesh: Option<MeshLevel>,
     #[command(flatten)]
     logs: LogOptions,
     /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it
@@ -89,25 +82,14 @@ impl Diagnose {
         let recording = parse_rows(&file, bytes, &map, &subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
-        let by_fem = |drive: &Drive, kind, mesh| match fresh_table(context, drive, kind, mesh) {
-            Err(Failure::BadInput(what) | Failure::Failed(what)) => Err(what.into()),
-            Ok(made) => Ok(made),
-        };
-        let remake: Option<&MakeTable<'_>> = if self.remake_tables { Some(&by_fem) } else { None };
         // The data that would separate a cause from the strongest named one are looked for in one log only.
         let asked = explained.first().copied().filter(|_| explained.len() == 1);
-        let options = Options { verbose: context.verbose(), asked, without: &without, remake, mesh: self.mesh };
+        let options = Settings { verbose: context.verbose(), asked, without: &without, ..Settings::default() };
         let progress = context.progress("diagnose");
         let done = diagnose_rows(recording, &subject, &options, |done, of, what| progress.set(done, of, what))
             .map_err(failed)?;
         drop(progress);
-        let mut progress = None;
-        let begins = || {
-            let bar = progress.insert(context.progress("FEM of the extended drive"));
-            bar.set(0, 1, "a few places on either flank");
-        };
-        let mut made = done.extend(&subject, &options, begins).map_err(failed)?;
-        drop(progress);
+        let mut made = done.extend(&subject).map_err(failed)?;
         let mut outputs = Outputs::new();
         self.write(context, &mut made, out, &mut outputs)?;
         let Diagnosed { recording, diagnosis, extended, .. } = &done;
@@ -246,13 +228,6 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     if !diagnosis.causes.is_empty() {
         for field in &extension.drive_fields {
             let _ = writeln!(text, "extended drive: {field}");
-        }
-        if let Some(agreement) = &extension.fem_agreement {
-            let _ = writeln!(
-                text,
-                "FEM of the extended drive: {:.2} arcsec rms from the causes found, of {:.2}",
-                agreement.difference_rms_arcsec, agreement.found_rms_arcsec
-            );
         }
     }
     let mut files = vec!["diagnosis.json".to_owned()];

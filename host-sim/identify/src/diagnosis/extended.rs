@@ -9,15 +9,13 @@ use flexspline::Table;
 use serde::{Deserialize, Serialize};
 
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Excitation, Law, LawUnits, Tag, library, together};
-use super::model::{Problem, Scaffold, terms_at};
+use super::candidate::{Acting, Excitation, Law, LawUnits, Tag, together};
+use super::model::{Problem, Scaffold, Term, among_each_other};
 use super::prepare::Jump;
 use super::report::Parameter;
-use super::resolution::averages_hide;
 use super::rows::{Rows, add_scaled, combined};
-use super::select::{Selected, fixed, less, settle_each};
-use super::thinned::Thinned;
-use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
+use super::select::{Selected, less, settle_each};
+use super::{DiagnosisError, Fineness, prepare, uncertainty};
 use crate::causes::{CauseName, ParameterName};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
@@ -177,67 +175,50 @@ impl Series {
 }
 
 impl Extended {
-    /// Fits the nominal model and the named causes to the sessions that are `used`; of the others only the history
-    /// counts (time, travel). A name that these data cannot speak about (a load without torque, a law of
-    /// teeth without teeth) is left out.
+    /// This model refitted to the sessions that are `used`, from where its causes are; of the others only the history
+    /// counts (time, travel).
     ///
     /// # Errors
     /// As [`super::diagnose`].
     pub(crate) fn fit_to(
+        &self,
         sessions: &[Session],
         used: &[bool],
         nominal: &Nominal,
         table: Option<&Table<'_>>,
-        causes: &[CauseName],
-        (settings, fineness): (&Settings<'_>, Fineness),
     ) -> Result<Extended, DiagnosisError> {
         let rows = Rows::new(sessions, nominal).learning_from(used);
         super::check(&rows)?;
-        let (base, jumps) = prepare::base(&rows, nominal, table);
-        let scales = LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
-        let on = Excitation::new(&rows, nominal, &base, &scales);
-        let laws = library(&on);
-        let uncertain = prepare::uncertain(&on, &[], &[]);
-        let Fineness { mut stride, noise, worth } = fineness;
-        if averages_hide(&on, &laws, causes, &uncertain, stride) {
-            stride = 1;
-        }
-        let fineness = Fineness { stride, noise, worth };
-        let problem = Problem::new(on, &uncertain, fineness);
-        let thinned = Thinned::of(&on, stride);
-        let on_sample = thinned.as_ref().map(|thinned| thinned.problem(&on, &uncertain, fineness));
-        let mut start = super::remembered(&laws, &fixed(on_sample.as_ref().unwrap_or(&problem), &laws, causes));
-        if on_sample.is_some() {
-            let selected = Selected::of(&problem, terms_at(&problem, &laws, &start));
-            let settled = selected.and_then(|selected| settle_each(&problem, selected, false));
-            start = super::remembered(&laws, &settled.ok_or(DiagnosisError::NotFinite)?.terms);
-        }
-        Extended::of(&problem, laws, &start).ok_or(DiagnosisError::NotFinite)
+        let base = Base::with_play(&rows, nominal, table, self.play);
+        let on = Excitation::new(&rows, nominal, &base, &self.scales);
+        let problem = Problem::new(on, &prepare::uncertain(&on, &[], &[]), self.fineness);
+        let terms = self.causes.iter().map(|cause| Term::new(&problem, &cause.law, cause.places.clone())).collect();
+        let settled = Selected::of(&problem, among_each_other(&problem, terms))
+            .and_then(|selected| settle_each(&problem, selected, false))
+            .ok_or(DiagnosisError::NotFinite)?;
+        Extended::of(&problem, &settled).ok_or(DiagnosisError::NotFinite)
     }
 
-    /// Fits the laws at `start` (index and places), and the nominal model alone.
-    pub(super) fn of(problem: &Problem<'_>, laws: Vec<Law>, start: &[(usize, Vec<f64>)]) -> Option<Extended> {
+    /// What was selected, and the nominal model alone.
+    pub(super) fn of(problem: &Problem<'_>, selected: &Selected<'_>) -> Option<Extended> {
         let alone = Scaffold::new(problem, Vec::new()).fit(None)?;
-        let selected = Selected::of(problem, terms_at(problem, &laws, start))?;
-        let known = uncertainty::known(problem, &selected, 1.0);
-        let base = selected.fit.base().to_vec();
-        let fitted = selected.terms.iter().enumerate().map(|(k, term)| {
+        let known = uncertainty::known(problem, selected, 1.0);
+        let cause = |(k, known): (usize, uncertainty::Known)| {
+            let term = &selected.terms[k];
             let Acting { roles, coefficients, .. } = term.acting(selected.fit.of(k));
-            (roles, coefficients)
-        });
-        let fitted: Vec<(Vec<Tag>, Vec<f64>)> = fitted.collect();
-        drop(selected);
-        let mut laws: Vec<Option<Law>> = laws.into_iter().map(Some).collect();
-        let cause = |(((law, places), (roles, coefficients)), known): (((usize, Vec<f64>), _), uncertainty::Known)| {
-            let law = laws[law].take()?;
-            let (name, parameters) = (law.cause()?, known.parameters);
-            Some(FittedCause { name, law, places, roles, coefficients, parameters })
+            let (law, name, parameters) = (term.law.clone(), term.law.cause()?, known.parameters);
+            Some(FittedCause { name, law, places: term.places.clone(), roles, coefficients, parameters })
         };
-        let causes = start.iter().cloned().zip(fitted).zip(known).filter_map(cause).collect();
-        let (play, scales) = (problem.on.base.law, problem.on.scales.clone());
-        let (recalibrated, fineness) = (alone.solution.coefficients, problem.fineness);
-        let floating = problem.on.base.floating.iter().map(|floating| floating.name.clone()).collect();
-        Some(Extended { play, scales, floating, recalibrated, base, causes, fineness })
+        let floating = problem.on.base.floating.iter().map(|floating| floating.name.clone());
+        Some(Extended {
+            play: problem.on.base.law,
+            scales: problem.on.scales.clone(),
+            floating: floating.collect(),
+            recalibrated: alone.solution.coefficients,
+            base: selected.fit.base().to_vec(),
+            causes: known.into_iter().enumerate().filter_map(cause).collect(),
+            fineness: problem.fineness,
+        })
     }
 
     /// Causes of the model.

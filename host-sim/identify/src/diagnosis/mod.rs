@@ -56,11 +56,10 @@ use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
 pub use explain::Explanation;
 pub(crate) use extended::nominal_arcsec;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
-use model::{Problem, Term, terms_at};
+use model::{Problem, Term, among_each_other, terms_at};
 use noise::Noise;
 pub use pipeline::{
-    Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, WrittenTable, diagnose_rows,
-    parse_rows,
+    Diagnosed, DiagnosisFile, Extension, Made, PipelineError, Subject, WrittenTable, diagnose_rows, parse_rows,
 };
 use prepare::FreeColumns;
 
@@ -92,8 +91,6 @@ pub enum DiagnosisError {
 pub struct Settings<'a> {
     /// Radius of the pitch circle of the output, mm: turns arc-seconds into micrometres.
     pub pitch_radius_mm: f64,
-    /// Averages of rows that fits are made on, about.
-    pub averages: usize,
     /// Says on stderr what is tried.
     pub verbose: bool,
     /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
@@ -115,12 +112,14 @@ pub struct Fineness {
 
 impl Default for Settings<'_> {
     fn default() -> Self {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, without: &[] }
+        Settings { pitch_radius_mm: 48.7, verbose: false, asked: None, without: &[] }
     }
 }
 
 /// Rows needed at least. *Guess*: several for each of some dozen columns.
 pub(crate) const LEAST_ROWS: usize = 200;
+/// Averages of rows that fits are made on, about.
+const AVERAGES: usize = 12_000;
 /// Times that causes are chosen again, at most.
 const MOST_ROUNDS: usize = 2;
 /// Diagnoses sessions against a nominal model, or against a table of the FEM that takes its place in the prediction.
@@ -163,7 +162,6 @@ pub(crate) fn diagnose_extended(
     let noise = problem.fineness.noise;
     let terms = terms_at(problem, &search.laws, &search.start);
     let selected = Selected::of(problem, terms).ok_or(DiagnosisError::NotFinite)?;
-    let mut start = remembered(&search.laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(problem, &selected, &maps, noise.white);
     let fast = search.fast.iter();
@@ -183,11 +181,10 @@ pub(crate) fn diagnose_extended(
         .map(|thinned| (thinned.problem(&on, &problem.uncertain, problem.fineness), thinned.share));
     let mut diagnosis = verdict::conclude(&search, &selected, &on_sample, left, settings, trace);
     diagnosis.set_aside = prepare::too_few_left(problem, diagnosis.finding);
-    drop(selected);
     let is_named = |cause: CauseName| diagnosis.causes.iter().any(|named| named.name == cause);
-    start.retain(|(law, _)| search.laws[*law].cause().is_none_or(is_named));
-    let Search { problem, laws, .. } = search;
-    let extended = Extended::of(&problem, laws, &start).ok_or(DiagnosisError::NotFinite)?;
+    let kept = selected.terms.into_iter().filter(|term| term.law.cause().is_none_or(is_named)).collect();
+    let selected = Selected::of(problem, among_each_other(problem, kept)).ok_or(DiagnosisError::NotFinite)?;
+    let extended = Extended::of(problem, &selected).ok_or(DiagnosisError::NotFinite)?;
     Ok((diagnosis, extended))
 }
 
@@ -230,7 +227,7 @@ impl<'a> Search<'a> {
             }
         }
         // Rows to an average that leave about as many averages as asked for, unless they hide something.
-        let usual = (on.rows.count_used() / settings.averages).max(1);
+        let usual = (on.rows.count_used() / AVERAGES).max(1);
         let (mut stride, mut free): (usize, Option<FreeColumns>) = (usual, None);
         let (mut hung, mut explained) = (vec![false; on.rows.len()], vec![0.0; on.rows.len()]);
         let mut uncertain = prepare::uncertain(on, &[], &hung);
@@ -249,7 +246,7 @@ impl<'a> Search<'a> {
             explained.iter_mut().zip(hidden.iter().flatten()).for_each(|(sum, fast)| *sum += fast);
             let before = last.as_ref().map(|(problem, _)| problem.fineness.noise);
             let explained_now: &[f64] = if new_line { &[] } else { &explained };
-            let (noise, worth) = prepare::noise(on, free_now, explained_now, &uncertain, before);
+            let (noise, worth) = prepare::noise(on, free_now, explained_now, &uncertain);
             let as_before = |before: Noise| (0.85..1.18).contains(&(noise.floor() / before.floor()));
             if !new_line && !other_rows && !closer_look && before.is_some_and(as_before) {
                 break;

@@ -9,7 +9,6 @@
 //! [`Subject`] is what the rows are held against. [`parse_rows`] and [`diagnose_rows`] come to the verdict;
 //! [`Diagnosed::extend`] makes the extended drive and its tables. Nothing is printed or written here.
 
-use std::error::Error;
 use std::sync::Arc;
 
 use blake3::Hash;
@@ -18,13 +17,13 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::report::{Cause, Diagnosis};
-use super::{DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
+use super::{DiagnosisError, Extended, Settings, diagnose_extended};
 use super::{channels, torque_zero, zeros};
 use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrate, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
-    CauseEntry, Evaluation, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError, TableKind,
-    TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry, less,
+    CauseEntry, Evaluation, ExtendedTables, Model, TableKind, TableSubject, causes_to_toml, evaluate, found_geometry,
+    less,
 };
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, least_and_most, parse,
@@ -34,8 +33,6 @@ use crate::synthesize::{EffectError, Sizes};
 use flexspline_design::kernels::Kernels;
 use flexspline_design::tables::{MadeTable, TableError, c_header, rust_source};
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
-use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 
 /// Rows that are diagnosed at most. *Chosen* for the memory that they take, 1.5 GB.
 const MOST_ROWS: usize = 1_000_000;
@@ -43,10 +40,6 @@ const MOST_ROWS: usize = 1_000_000;
 /// Advice where an error leaps so often that no row counts.
 const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of \
                                 this drive; record it under a load that keeps one flank";
-
-/// The causes found are shapes of an extended drive if its FEM differs from them by less than this share of them.
-/// *Guess*: beyond, half of the cause has another shape.
-const WORST_AGREEMENT: f64 = 0.5;
 
 /// Why a file was not diagnosed, or what was found not extended.
 #[derive(Debug, Error)]
@@ -94,12 +87,6 @@ pub enum PipelineError {
     /// The causes make no drive.
     #[error("the causes make no drive: {0}")]
     NoDrive(#[from] DriveError),
-    /// The FEM of the extended drive does not converge.
-    #[error("the FEM of the extended drive: {0}")]
-    Fem(#[from] SolveError),
-    /// No table was made by FEM.
-    #[error(transparent)]
-    Remake(RemakeError),
     /// The samples make no table.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -117,11 +104,7 @@ impl PipelineError {
     pub fn is_bad_input(&self) -> bool {
         match self {
             PipelineError::Calibration(error) => error.is_bad_input(),
-            PipelineError::NoDrive(_)
-            | PipelineError::Fem(_)
-            | PipelineError::Remake(_)
-            | PipelineError::Table(_)
-            | PipelineError::Wheels(_) => false,
+            PipelineError::NoDrive(_) | PipelineError::Table(_) | PipelineError::Wheels(_) => false,
             _ => true,
         }
     }
@@ -260,33 +243,6 @@ impl<'a> Subject<'a> {
     fn against(&self) -> (&Nominal, Option<&Table<'a>>) {
         (&self.nominal, self.table.as_ref())
     }
-
-    /// The mesh of FEM runs: the one asked for, or that of the table.
-    fn mesh(&self, asked: Option<MeshLevel>) -> MeshLevel {
-        // What a data sheet added is said after a comma.
-        let level = |table: &Table<'_>| table.mesh_level().split(',').next().and_then(|level| level.parse().ok());
-        let of_table = || self.table.as_ref().and_then(level);
-        asked.or_else(of_table).unwrap_or(MeshLevel::Coarse)
-    }
-}
-
-/// Makes a table of a drive by FEM; the caller knows how to show that it goes on.
-pub type MakeTable<'a> =
-    dyn Fn(&Drive, GeneratorKind, MeshLevel) -> Result<MadeTable, Box<dyn Error + Send + Sync>> + 'a;
-
-/// How a file is diagnosed.
-#[derive(Clone, Copy, Default)]
-pub struct Options<'a> {
-    /// Says on stderr what is tried.
-    pub verbose: bool,
-    /// A cause that is asked about.
-    pub asked: Option<CauseName>,
-    /// Causes that are not considered.
-    pub without: &'a [CauseName],
-    /// Makes extended tables by FEM; else they are sampled from the extended model.
-    pub remake: Option<&'a MakeTable<'a>>,
-    /// Mesh of FEM runs; else that of the table.
-    pub mesh: Option<MeshLevel>,
 }
 
 /// Measured rows with all that is said of them.
@@ -349,16 +305,10 @@ fn without_torque(recording: &Recording) -> Option<String> {
 pub fn diagnose_rows(
     mut recording: Recording,
     subject: &Subject<'_>,
-    options: &Options<'_>,
+    settings: &Settings<'_>,
     mut progress: impl FnMut(usize, usize, &str),
 ) -> Result<Diagnosed, PipelineError> {
-    let settings = Settings {
-        verbose: options.verbose,
-        asked: options.asked,
-        without: options.without,
-        pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(),
-        ..Settings::default()
-    };
+    let settings = Settings { pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(), ..*settings };
     let (nominal, table) = subject.against();
     let (mut diagnosis, extended) =
         diagnose_extended(&recording.sessions, nominal, table, &settings, |done, of, what| {
@@ -387,17 +337,9 @@ pub fn diagnose_rows(
     let known = known_table.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PipelineError::Image)?;
     let tables = tables_of(subject, &table_subject, std::slice::from_ref(&recording));
     let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
-    let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, RemakeError> {
-        let Some(make) = options.remake else { return Ok(None) };
-        let of = |cause: &FittedCause| CauseEntry::of(cause.name(), &cause.parameters);
-        let entries: Vec<CauseEntry> = fitted.causes().iter().map(of).collect();
-        let found = found_geometry(&subject.drive, fitted, &entries, (nominal, table), tables.orientation_rad)?;
-        Ok(remade(make, subject, &found, options.mesh)?.map(|made| made.image))
-    };
-    let remake: Option<&Remake<'_>> = if options.remake.is_some() { Some(&remake) } else { None };
     let rows = [&recording, measured.as_ref().unwrap_or(&recording)];
     let (found, prior) = ((&extended, causes.as_slice()), subject.prior(known.as_ref()));
-    let evaluation = evaluate(rows, found, &tables, &prior, &settings, remake)?;
+    let evaluation = evaluate(rows, found, &tables, &prior);
     diagnosis.compensated(&evaluation);
     Ok(Diagnosed { recording, diagnosis, extended, known_table, evaluation })
 }
@@ -442,13 +384,8 @@ pub struct Extension {
     /// Identity of the table that is written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table_id: Option<String>,
-    /// Whether the extended tables are of the FEM of the extended drive; else they are sampled from the extended model.
-    pub tables_by_fem: bool,
     /// Fields of the drive that hold causes.
     pub drive_fields: Vec<String>,
-    /// What the FEM of that drive says.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fem_agreement: Option<FemAgreement>,
     /// Causes that stand in `[extension]` of drive-extended.toml.
     pub named_causes: Vec<CauseName>,
     /// Compensation by session held out, and which causes are in the tables.
@@ -508,22 +445,16 @@ impl Diagnosed {
     }
 
     /// Makes the extended drive where causes were found, and the table that leaves least in rows left out, if one
-    /// gains. `by_fem` is called before the FEM of the drive begins.
+    /// gains.
     ///
     /// # Errors
-    /// The causes make no drive; the FEM of it does not converge.
-    pub fn extend(
-        &self,
-        subject: &Subject<'_>,
-        options: &Options<'_>,
-        by_fem: impl FnOnce(),
-    ) -> Result<Made, PipelineError> {
+    /// The causes make no drive; no table of it is made.
+    pub fn extend(&self, subject: &Subject<'_>) -> Result<Made, PipelineError> {
         let evaluation = &self.evaluation;
         let mut extension = Extension { compensation: Some(evaluation.clone()), ..Extension::default() };
         let table_subject = subject.table_subject();
         let tables = tables_of(subject, &table_subject, std::slice::from_ref(&self.recording));
         let gain = evaluation.tables_that_gain(subject.table.is_some());
-        let mut by_drive: Option<MadeTable> = None;
         let mut drive_toml = None;
         if let Some(known) = subject.model.as_ref().filter(|_| !self.diagnosis.causes.is_empty()) {
             let mut model = Model::of_diagnosis(&subject.nominal, &self.diagnosis, &self.extended);
@@ -531,19 +462,18 @@ impl Diagnosed {
             extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
             drive_toml = Some(model.to_toml());
         } else if !self.diagnosis.causes.is_empty() {
-            let found = self.geometry(subject, &tables, options, by_fem, &mut extension)?;
-            extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
+            let entry = |cause: &Cause| CauseEntry::of(cause.name, &cause.parameters);
+            let causes: Vec<CauseEntry> = self.diagnosis.causes.iter().map(entry).collect();
+            let orientation_rad = tables.orientation_rad;
+            let found = found_geometry(&subject.drive, &self.extended, &causes, subject.against(), orientation_rad)?;
+            extension.drive_fields.clone_from(&found.fields);
             extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
-            if let Some(make) = options.remake.filter(|_| gain.iter().any(|(kind, _)| *kind == TableKind::Extended)) {
-                by_drive = remade(make, subject, &found, options.mesh).map_err(PipelineError::Remake)?;
-                extension.tables_by_fem = by_drive.is_some();
-            }
             drive_toml = Some(found.drive.to_toml() + &causes_to_toml(&found.rest));
         }
         let (mut made_tables, mut why) = (Vec::new(), evaluation.words());
         for (kind, left) in gain {
             let made = match kind {
-                TableKind::Extended => by_drive.take().map_or_else(|| tables.extended(&self.extended), Ok),
+                TableKind::Extended => tables.extended(&self.extended),
                 _ if made_tables.is_empty() => self.calibrated(subject, &tables),
                 _ => continue,
             };
@@ -587,54 +517,6 @@ impl Diagnosed {
         let known = known.map_err(PipelineError::Image)?;
         Ok(calibrate(&[recording], &subject.prior(known.as_ref()))?.table)
     }
-
-    /// The drive with the causes that are geometry, as far as the FEM bears them out.
-    fn geometry(
-        &self,
-        subject: &Subject<'_>,
-        tables: &ExtendedTables<'_>,
-        options: &Options<'_>,
-        by_fem: impl FnOnce(),
-        extension: &mut Extension,
-    ) -> Result<FoundGeometry, PipelineError> {
-        let of = subject.against();
-        let entry = |cause: &Cause| CauseEntry::of(cause.name, &cause.parameters);
-        let causes: Vec<CauseEntry> = self.diagnosis.causes.iter().map(entry).collect();
-        let found = found_geometry(&subject.drive, &self.extended, &causes, of, tables.orientation_rad)?;
-        if !found.mapped.iter().any(|mapped| mapped.by_angle) {
-            return Ok(found);
-        }
-        by_fem();
-        let settings =
-            SolverSettings { method: Method::Fast, mesh: subject.mesh(options.mesh), ..SolverSettings::default() };
-        let drives = (&subject.drive, &found);
-        let agreement = check_by_fem(drives, subject.kind, settings, &self.extended, of, tables.orientation_rad)?;
-        extension.fem_agreement = Some(agreement);
-        if agreement.difference_rms_arcsec < WORST_AGREEMENT * agreement.found_rms_arcsec {
-            return Ok(found);
-        }
-        // The FEM of such a drive does something else: the causes are kept by name, not as a shape that is not theirs.
-        let (shapes, others): (Vec<CauseEntry>, Vec<CauseEntry>) = causes
-            .into_iter()
-            .partition(|cause| found.mapped.iter().any(|mapped| mapped.by_angle && mapped.cause == cause.name));
-        let mut without = found_geometry(&subject.drive, &self.extended, &others, of, tables.orientation_rad)?;
-        without.rest.splice(0..0, shapes);
-        Ok(without)
-    }
-}
-
-/// The table of the extended drive by FEM, if the drive holds all that a table can.
-fn remade(
-    make: &MakeTable<'_>,
-    subject: &Subject<'_>,
-    found: &FoundGeometry,
-    mesh: Option<MeshLevel>,
-) -> Result<Option<MadeTable>, RemakeError> {
-    // What is in no field of the drive would be missing in a table by FEM.
-    if found.rest.iter().any(|cause| cause.name.no_place_in_a_table().is_none()) {
-        return Ok(None);
-    }
-    Ok(Some(make(&found.drive, subject.kind, subject.mesh(mesh))?))
 }
 
 /// Tables of the extended model over what the rows hold: their largest torque, their temperatures, the angle against
@@ -681,7 +563,7 @@ mod tests {
             text += &format!("{:.2},{psi:.6},{error:.4},12\n", 0.01 * f64::from(k));
         }
         let recording = parse_rows("gear.csv", text.as_bytes(), &ColumnMap::default(), &subject).unwrap();
-        let done = diagnose_rows(recording, &subject, &Options::default(), |_, _, _| {}).unwrap();
+        let done = diagnose_rows(recording, &subject, &Settings::default(), |_, _, _| {}).unwrap();
         (done.diagnosis.finding, done.recording.notes.clone(), done.diagnosis.text())
     }
 

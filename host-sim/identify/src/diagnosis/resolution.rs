@@ -5,7 +5,6 @@
 use super::candidate::{Excitation, Law, Tolerance};
 use super::noise::Whitener;
 use super::rows::{Rows, combined, rms, robust_std};
-use crate::causes::CauseName;
 use crate::least_squares::Normal;
 
 /// Rows whose mean is taken from each of them, to see what is fast. *Guess*: what passes within a few rows is fast.
@@ -38,20 +37,6 @@ pub(crate) fn hidden_by_averages(
         .filter(|law| law.named() && law.shapes.is_empty())
         .filter_map(|law| hidden(on, law, &averages))
         .find_map(|main| explained_in_detail(on.rows, &main, &left, uncertain))
-}
-
-/// Whether averages of `stride` rows hide any of these causes.
-#[must_use]
-pub(crate) fn averages_hide(
-    on: &Excitation<'_>,
-    laws: &[Law],
-    causes: &[CauseName],
-    uncertain: &[bool],
-    stride: usize,
-) -> bool {
-    let averages = Whitener::plain(on.rows, uncertain, stride, 1.0);
-    let asked = |law: &&Law| law.shapes.is_empty() && law.cause().is_some_and(|cause| causes.contains(&cause));
-    laws.iter().filter(asked).any(|law| hidden(on, law, &averages).is_some())
 }
 
 /// The main columns of a law, if averages hide all of them.

@@ -1,7 +1,7 @@
 //! The whole diagnosis on made-up data: of `synthesize`, by the laws of the candidates, and of plants of its own.
 
 use super::report::{Diagnosis, Verdict};
-use super::{DiagnosisError, Extended, Settings, diagnose};
+use super::{DiagnosisError, Settings, diagnose};
 use std::f64::consts::FRAC_PI_2;
 
 use crate::causes::{CauseName, Kind, ParameterName};
@@ -480,11 +480,8 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
     let sessions = data(&[LOOP, "sensor_latency:delay_s=0.002"], 31);
     let nominal = catalogue_drive();
     let used = [true, false, true, false, true];
-    let causes = [CauseName::TorsionalHysteresis, CauseName::SensorLatency];
-    let settings = Settings::default();
-    let (_, all) = super::diagnose_extended(&sessions, &nominal, None, &settings, |_, _, _| {}).unwrap();
-    let settings = (&settings, all.fineness);
-    let extended = Extended::fit_to(&sessions, &used, &nominal, None, &causes, settings).unwrap();
+    let (_, all) = super::diagnose_extended(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let extended = all.fit_to(&sessions, &used, &nominal, None).unwrap();
     assert_eq!(extended.causes().len(), 2);
     let series = extended.predict(&sessions, &nominal, None);
     let square = |values: Vec<f64>, uncertain: &[bool]| -> f64 {
@@ -506,16 +503,15 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
     for k in [1, 3] {
         changed[k].error_rad.iter_mut().for_each(|e| *e *= -3.0);
     }
-    let again = Extended::fit_to(&changed, &used, &nominal, None, &causes, settings).unwrap();
+    let again = all.fit_to(&changed, &used, &nominal, None).unwrap();
     assert_eq!(again.predict(&sessions, &nominal, None), series);
 }
 
 #[test]
 fn rows_without_a_change_of_flank_are_predicted_as_they_are_among_others() {
     let (sessions, nominal) = (data(&[], 31), catalogue_drive());
-    let noise = super::Noise { white: 2.0, wander: 0.8, correlation_s: 12.0 };
-    let settings = (&Settings::default(), super::Fineness { stride: 1, noise, worth: 1.0 });
-    let extended = Extended::fit_to(&sessions, &[true; 5], &nominal, None, &[], settings).unwrap();
+    let (_, extended) =
+        super::diagnose_extended(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
     let rows = |of: fn(usize) -> f64| (0..200).map(of).collect::<Vec<f64>>();
     let others = [30.0, nominal.temperature_c, 0.0].map(|value| vec![value; 200]);
     let steady = Session::imagined(rows(|k| 1e5 + 0.01 * k as f64), rows(|k| 0.05 * k as f64), others);
@@ -537,7 +533,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let scales = super::LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
         let on = super::Excitation::new(&rows, &drive, &base, &scales);
         let uncertain = super::prepare::uncertain(&on, &[], &[]);
-        let usual = rows.count_used() / settings.averages;
+        let usual = rows.count_used() / super::AVERAGES;
         let hidden = super::hidden_by_averages(&on, &super::library(&on), &uncertain, usual, &[]);
         if hidden.is_some() { 1 } else { usual }
     };
@@ -849,7 +845,6 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
                 &super::FreeColumns::of(on, &laws, 1),
                 &[],
                 &super::prepare::uncertain(on, &[], &[]),
-                None,
             )
             .0,
         );

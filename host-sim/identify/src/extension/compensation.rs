@@ -12,11 +12,10 @@ use serde::Serialize;
 use super::sampled::ExtendedTables;
 use crate::calibrate::{LEAST_GAIN, Prior, calibrate};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
-use crate::diagnosis::{Compensation, Extended, PipelineError, Series, Settings};
+use crate::diagnosis::{Compensation, Extended, Series};
 use crate::measurement::{Recording, Session, rms};
 use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_mechanics::drive::DriveError;
 
 /// With fewer sessions than this, each is cut into parts …
 const FEWEST_SESSIONS: usize = 3;
@@ -141,37 +140,18 @@ pub fn left_by_core(table: &Table<'_>, session: &Session, temperature_c: f64) ->
     session.error_rad.iter().zip(said).map(left).collect()
 }
 
-/// Why no table of the extended drive was made by FEM.
-#[derive(Debug, thiserror::Error)]
-pub enum RemakeError {
-    /// The causes make no drive.
-    #[error(transparent)]
-    Drive(#[from] DriveError),
-    /// The caller, who makes the table, failed or was stopped.
-    #[error(transparent)]
-    Make(#[from] Box<dyn std::error::Error + Send + Sync>),
-}
-
-/// Makes the image of a table of an extended model by other means than sampling it, if it can.
-pub type Remake<'a> = dyn Fn(&Extended) -> Result<Option<Vec<u8>>, RemakeError> + 'a;
-
 /// Fits the causes, and the parts of a calibration, to the sessions to learn from, makes tables of what was found, and
 /// runs the core over the others. `found` is the model fitted to all; `recording` is without what was known before,
 /// `measured` with it, as the tables and the prior of the calibration are.
-///
-/// # Errors
-/// A table that was to be made otherwise was not.
 pub fn evaluate(
     [recording, measured]: [&Recording; 2],
     (found, causes): (&Extended, &[CauseName]),
     tables: &ExtendedTables<'_>,
     prior: &Prior<'_>,
-    settings: &Settings<'_>,
-    remake: Option<&Remake<'_>>,
-) -> Result<Evaluation, PipelineError> {
+) -> Evaluation {
     let (sessions, used) = split(&recording.sessions);
     let (nominal, mut evaluation) = (tables.nominal, Evaluation::default());
-    let fit = || Extended::fit_to(&sessions, &used, nominal, tables.table, causes, (settings, found.fineness));
+    let fit = || found.fit_to(&sessions, &used, nominal, tables.table);
     let fitted = if causes.is_empty() { None } else { Some(fit()) };
     let fitted = fitted.and_then(|fitted| fitted.map_err(|why| evaluation.not_made.push(why.to_string())).ok());
     let fitted = fitted.as_ref();
@@ -213,11 +193,7 @@ pub fn evaluate(
     });
     let mut by_extended = None;
     if let Some(fitted) = fitted.filter(|_| !evaluation.applied.is_empty()) {
-        let image = match remake.map_or(Ok(None), |remake| remake(fitted)).map_err(PipelineError::Remake)? {
-            Some(image) => Ok(image),
-            None => tables.extended(fitted).map(|made| made.image),
-        };
-        match image {
+        match tables.extended(fitted).map(|made| made.image) {
             Ok(image) => by_extended = by_image(image),
             Err(why) => {
                 evaluation.applied.clear();
@@ -251,7 +227,7 @@ pub fn evaluate(
     evaluation.left = left(&all);
     let better = |s: &&Compensated| s.left.rms_extended_tables_arcsec < s.left.rms_nominal_tables_arcsec;
     evaluation.improved = evaluation.sessions.iter().filter(better).count();
-    Ok(evaluation)
+    evaluation
 }
 
 /// Takes what something adds off the error of each session, arcsec.

@@ -11,8 +11,6 @@
 //! | pitch error `p cos k(x - f)` | `+p / r cos k(x - f)` on the flexspline, `-` on the circular spline, even `k` |
 //! | oval `w cos 2(x - c)` | `w / r (sin 2(x - c) / 2 +- tan a cos 2(x - c))` |
 //! | depth `w` off every flank | `+- w / r_b` |
-//!
-//! [`check_by_fem`] compares what the FEM then makes of the drive with what was found.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,17 +18,12 @@ use flexspline::Table;
 use num_complex::Complex;
 
 use super::model::CauseEntry;
-use crate::causes::{CauseName, ParameterName as Name};
+use crate::causes::ParameterName as Name;
 use crate::diagnosis::Extended;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use flexspline_base::robust::rms;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_mechanics::drive::{
-    DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, SleeveKind, Wheel,
-};
-use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
+use flexspline_mechanics::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, Harmonic, SleeveKind, Wheel};
 
 /// Load under which causes are looked at, N·m: light, as loads let more teeth share what is displaced.
 const PROBE_N_M: f64 = 2.0;
@@ -39,24 +32,13 @@ const POSITIONS: usize = 1009;
 /// The largest sizes that a drive file takes, µm.
 const LARGEST_UM: f64 = 100.0;
 
-/// A cause that is in the drive.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Mapped {
-    /// The cause.
-    pub cause: CauseName,
-    /// The fields it set, `path = value`.
-    pub fields: Vec<String>,
-    /// Whether it depends on where the drive stands in its turns.
-    pub by_angle: bool,
-}
-
 /// A drive with the causes that are geometry, and the rest.
 #[derive(Clone, Debug)]
 pub(crate) struct FoundGeometry {
     /// The drive.
     pub drive: Drive,
-    /// Its contents.
-    pub mapped: Vec<Mapped>,
+    /// The fields that hold causes, `path = value`.
+    pub fields: Vec<String>,
     /// Causes that no field of a drive holds.
     pub rest: Vec<CauseEntry>,
 }
@@ -131,8 +113,6 @@ pub(crate) struct Placing<'a> {
     probe: &'a Probe,
     /// Which of the causes of the probe it is, if it is one.
     at: Option<usize>,
-    /// Whether its size and place are read from the probe: they depend on where the drive stands in its turns.
-    by_angle: bool,
     /// Whether the drive stays at one angle against gravity.
     at_one_orientation: bool,
     /// The fields that were set, `path = value`.
@@ -150,12 +130,6 @@ fn um(arcsec: f64, radius_mm: f64) -> f64 {
 }
 
 impl Placing<'_> {
-    /// Which of the causes of the probe it is, for what is read from it.
-    fn in_probe(&mut self) -> Option<usize> {
-        self.by_angle = true;
-        self.at
-    }
-
     fn value(&self, name: Name) -> Option<f64> {
         self.cause.parameters.get(name.as_str()).copied()
     }
@@ -184,7 +158,7 @@ impl Placing<'_> {
         radius_mm: f64,
         [size, phase]: [&str; 2],
     ) {
-        let Some(at) = self.in_probe() else { return };
+        let Some(at) = self.at else { return };
         let flank_angle_rad = self.drive.circular_spline.bearing_flank_angle_rad();
         let wave = read(self.probe.wave(at, on_circular_spline, 2.0), flank_angle_rad);
         self.set(size, |_| rounded(um(wave.norm(), radius_mm)));
@@ -213,7 +187,7 @@ impl Placing<'_> {
 
     /// Harmonics of the pitch of a wheel.
     pub(crate) fn set_pitch_harmonics(&mut self, wheel: Wheel) {
-        let Some(at) = self.in_probe() else { return };
+        let Some(at) = self.at else { return };
         let on_circular_spline = wheel == Wheel::CircularSpline;
         let (f, c, built) = (&self.drive.flexspline, &self.drive.circular_spline, &mut self.found.as_built);
         let (field, list, radius, sign) = if on_circular_spline {
@@ -240,7 +214,7 @@ impl Placing<'_> {
 
     /// A damaged tooth, on the flanks on which the data show it.
     pub(crate) fn set_damaged_tooth(&mut self) {
-        let Some(at) = self.in_probe() else { return };
+        let Some(at) = self.at else { return };
         let [tooth, wheel, depth] = [Name::Tooth, Name::Wheel, Name::DepthUm].map(|name| self.value(name));
         let (Some(tooth), Some(wheel), Some(depth)) = (tooth, wheel, depth) else { return };
         let (wheel, teeth) = match wheel < 0.5 {
@@ -333,7 +307,7 @@ pub(crate) fn found_geometry(
     let generator: Vec<f64> = (0..POSITIONS).map(|k| k as f64 * step).collect();
     let probe = Probe::new(extended, nominal, table, generator, orientation_rad.unwrap_or(0.0));
     let mut found = drive.clone();
-    let (mut mapped, mut rest) = (Vec::new(), Vec::new());
+    let (mut fields, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
         let at = extended.causes().iter().position(|fitted| fitted.name() == cause.name);
         let mut placing = Placing {
@@ -343,106 +317,41 @@ pub(crate) fn found_geometry(
             cause,
             probe: &probe,
             at,
-            by_angle: false,
             at_one_orientation: orientation_rad.is_some(),
             fields: Vec::new(),
         };
         (cause.name.spec().place)(&mut placing);
-        let Placing { fields, by_angle, .. } = placing;
+        let set = placing.fields;
         let b = &found.as_built;
         let displaced = [b.circular_spline_eccentricity_um, b.flexspline_runout_um, b.circular_spline_offset_um];
         let largest = displaced.into_iter().fold(b.circular_spline_ovality_um, f64::max);
-        if fields.is_empty() || largest > LARGEST_UM {
+        if set.is_empty() || largest > LARGEST_UM {
             rest.push(cause.clone());
         } else {
-            mapped.push(Mapped { cause: cause.name, fields, by_angle });
+            fields.extend(set);
         }
     }
-    if !mapped.is_empty() {
+    if !fields.is_empty() {
         found.name = format!("{}-extended", drive.name);
     }
     found.check()?;
-    Ok(FoundGeometry { drive: found, mapped, rest })
-}
-
-/// How well the FEM of a drive agrees with what was found.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct FemAgreement {
-    /// The part of the causes, rms over the places looked at, arcsec.
-    pub found_rms_arcsec: f64,
-    /// The change of the error by FEM, less that part, rms, arcsec.
-    pub difference_rms_arcsec: f64,
-}
-
-/// Places looked at: whole flexspline pitches, where the ideal drive is in one state, spread over the turns.
-const PLACES: u32 = 12;
-const PITCHES_APART: u32 = 23;
-
-/// Runs the FEM of both drives at a few places under a light load on either flank, and compares the difference with
-/// what the mapped causes add there. The mean on each flank takes no part: a displacement eats clearance, which is a
-/// cause of its own.
-///
-/// # Errors
-/// No convergence.
-pub(crate) fn check_by_fem(
-    (before, after): (&Drive, &FoundGeometry),
-    kind: GeneratorKind,
-    settings: SolverSettings,
-    extended: &Extended,
-    (nominal, table): (&Nominal, Option<&Table<'_>>),
-    orientation_rad: Option<f64>,
-) -> Result<FemAgreement, SolveError> {
-    let pitch = TAU / f64::from(before.flexspline.teeth);
-    let places: Vec<f64> = (0..PLACES).map(|k| f64::from(k * PITCHES_APART) * pitch).collect();
-    let probe = Probe::new(extended, nominal, table, places.clone(), orientation_rad.unwrap_or(0.0));
-    let chosen: Vec<usize> = after
-        .mapped
-        .iter()
-        .filter(|mapped| mapped.by_angle)
-        .filter_map(|mapped| extended.causes().iter().position(|fitted| fitted.name() == mapped.cause))
-        .collect();
-    let (mut found, mut difference) = (Vec::new(), Vec::new());
-    let centred = |values: Vec<f64>| {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        values.into_iter().map(move |value| value - mean)
-    };
-    let smooth = |drive: &Drive| {
-        let mut drive = drive.clone();
-        drive.flanks.friction_coefficient = 0.0;
-        drive
-    };
-    let temperature_c = before.temperature.reference_c;
-    let of = |drive: &Drive| Problem::new(&smooth(drive), kind, temperature_c, settings);
-    let (ideal, built) = (of(before)?, of(&after.drive)?);
-    for (flank, load) in [PROBE_N_M, -PROBE_N_M].into_iter().enumerate() {
-        let reference = stands(&ideal, 0.0, load)?;
-        let by_fem = places
-            .iter()
-            .map(|psi| Ok(stands(&built, *psi, load)? - reference))
-            .collect::<Result<Vec<f64>, SolveError>>()?;
-        let by_causes: Vec<f64> =
-            (0..places.len()).map(|k| chosen.iter().map(|cause| probe.error[flank][*cause][k]).sum()).collect();
-        for (by_fem, by_causes) in centred(by_fem).zip(centred(by_causes)) {
-            found.push(by_causes);
-            difference.push(by_fem - by_causes);
-        }
-    }
-    Ok(FemAgreement { found_rms_arcsec: rms(&found), difference_rms_arcsec: rms(&difference) })
-}
-
-/// Error of the drive deformed at a generator angle, then loaded, arcsec.
-fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> Result<f64, SolveError> {
-    let mut motion = Motion::deformed_or_turned_in(problem, generator_rad)?;
-    motion.load(torque_n_m)?;
-    Ok(motion.error_arcsec())
+    Ok(FoundGeometry { drive: found, fields, rest })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flexspline_mechanics::drive::AsBuilt;
+    use flexspline_mechanics::drive::{AsBuilt, GeneratorKind};
     use flexspline_mechanics::mesh::MeshLevel;
-    use flexspline_mechanics::stepping::Method;
+    use flexspline_mechanics::motion::Motion;
+    use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings};
+
+    /// Error of the drive deformed at a generator angle, then loaded, arcsec.
+    fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> Result<f64, SolveError> {
+        let mut motion = Motion::deformed_or_turned_in(problem, generator_rad)?;
+        motion.load(torque_n_m)?;
+        Ok(motion.error_arcsec())
+    }
 
     /// Errors by the closed forms above, over a turn of the output.
     fn waves(error: impl Fn(f64, f64) -> f64, order: f64) -> [Wave; 2] {

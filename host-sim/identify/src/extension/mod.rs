@@ -2,8 +2,7 @@
 //!
 //! * [`Model`]: `drive-extended.toml` of a catalogue drive: the nominal model recalibrated, and `[[extension.cause]]`
 //!   entries.
-//! * `FoundGeometry`: causes that are geometry, as `[as_built]` of a drive that the FEM runs, checked against the
-//!   FEM.
+//! * `FoundGeometry`: causes that are geometry, as `[as_built]` of a drive that the FEM runs.
 //! * `ExtendedTables`: tables of the extended model, sampled in steady motion at the nodes of a table.
 //! * [`evaluate`]: what the core leaves of the error in sessions that took no part in the fit, without tables, with
 //!   nominal, calibrated and extended ones.
@@ -14,9 +13,7 @@ mod model;
 mod sampled;
 
 pub(crate) use compensation::less;
-pub use compensation::{
-    Compensated, Evaluation, NotApplied, Remake, RemakeError, TableKind, evaluate, left_by_core, split,
-};
-pub(crate) use geometry::{FemAgreement, FoundGeometry, Placing, check_by_fem, found_geometry};
+pub use compensation::{Compensated, Evaluation, NotApplied, TableKind, evaluate, left_by_core, split};
+pub(crate) use geometry::{Placing, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
 pub(crate) use sampled::{ExtendedTables, TableSubject};

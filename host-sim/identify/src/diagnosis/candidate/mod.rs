@@ -157,12 +157,6 @@ impl<'a> Excitation<'a> {
         self.nominal.kernels.as_ref().filter(|_| self.nominal.teeth.is_some())
     }
 
-    /// Whether the drive is turned against gravity during the data.
-    fn is_turned_about(&self) -> bool {
-        let orientation = &self.rows.orientation;
-        orientation.iter().any(|o| (o - orientation[0]).abs() > 1e-3)
-    }
-
     /// Nominal wind-up at rest, arcsec/N·m; none for a drive that does not give.
     fn slope_at_rest(&self) -> Option<f64> {
         let slope = self.nominal.wind_up_arcsec(1e-3) / 1e-3;
@@ -339,14 +333,15 @@ fn beside(values: Vec<f64>, share: f64) -> Regressor {
 /// A parameter for the report: name and value.
 pub(crate) type Named = (ParameterName, f64);
 
-type MakeColumns = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync>;
-type MakeParameters = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
-type IsPhysical = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync>;
-type AddedLoad = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync>;
-type Apart = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync>;
-type Beginnings = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync>;
+type MakeColumns = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync>;
+type MakeParameters = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
+type IsPhysical = Arc<dyn Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync>;
+type AddedLoad = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync>;
+type Apart = Arc<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync>;
+type Beginnings = Arc<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync>;
 
 /// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
+#[derive(Clone)]
 pub(crate) struct Lead {
     columns: MakeColumns,
     beginnings: Beginnings,
@@ -357,6 +352,7 @@ static LAWS: AtomicU64 = AtomicU64::new(0);
 
 /// One law of one cause: what it is about, how it is evaluated, how it may be wrong, how it is looked for, and how it
 /// acts on others.
+#[derive(Clone)]
 pub(crate) struct Law {
     id: u64,
     /// Its subject.
@@ -399,7 +395,7 @@ pub struct Wrong {
 }
 
 /// How a law is looked for.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Search {
     /// Where to begin.
     pub lead: Option<Lead>,
@@ -413,12 +409,12 @@ pub(crate) struct Search {
 }
 
 /// How a law acts on other causes, and they on it.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Acts {
     /// Load (N·m, row by row) that the cause adds to the torque that was recorded.
     load: Option<AddedLoad>,
     /// How far it brings one zone of teeth ahead of the other.
-    zones: Option<Apart>,
+    pub zones: Option<Apart>,
     /// The effect of other causes on the zones of teeth and on the clearance enters the law.
     pub meets_zones: bool,
     /// Much of it shows while the play is crossed, in rows that do not count for the sizes of others.
@@ -454,9 +450,9 @@ impl Law {
             label,
             variant: Cow::Borrowed(""),
             shapes: Vec::new(),
-            columns: Box::new(columns),
-            parameters: Box::new(|_, _, _| Vec::new()),
-            physical: Box::new(|_, _| true),
+            columns: Arc::new(columns),
+            parameters: Arc::new(|_, _, _| Vec::new()),
+            physical: Arc::new(|_, _| true),
             smooth: false,
             wrong: Wrong {
                 misfit: USUAL_MISFIT,
@@ -513,12 +509,6 @@ impl Law {
         self.wrong.most_nuisance = MOST_NUISANCE_OF_KNOWN;
         self
     }
-    /// A law of gravity whose orientation is counted against the output angle.
-    fn counted_back(mut self) -> Law {
-        let comma = if self.variant.is_empty() { "" } else { ", " };
-        self.variant = format!("{}{comma}orientation counted back", self.variant).into();
-        self
-    }
     /// An encoder that reads what a wheel may do as well: odds are on the wheel, and its misfit may look like this law.
     fn after_wheels(mut self) -> Law {
         self.search.odds_against = AFTER_WHEELS;
@@ -547,22 +537,24 @@ impl Law {
         mut self,
         parameters: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync + 'static,
     ) -> Law {
-        self.parameters = Box::new(parameters);
+        self.parameters = Arc::new(parameters);
         self
     }
     fn physical_if(mut self, physical: impl Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync + 'static) -> Law {
-        self.physical = Box::new(physical);
+        self.physical = Arc::new(physical);
         self
     }
     fn adds_load(mut self, load: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync + 'static) -> Law {
-        self.acts.load = Some(Box::new(load));
+        self.acts.load = Some(Arc::new(load));
+        // It moves the torque at which the play is crossed.
+        self.acts.in_crossings = true;
         self
     }
     fn parts_zones(
         mut self,
         apart: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync + 'static,
     ) -> Law {
-        self.acts.zones = Some(Box::new(apart));
+        self.acts.zones = Some(Arc::new(apart));
         self
     }
     fn led_by(
@@ -570,7 +562,7 @@ impl Law {
         columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync + 'static,
         beginnings: impl Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync + 'static,
     ) -> Law {
-        self.search.lead = Some(Lead { columns: Box::new(columns), beginnings: Box::new(beginnings) });
+        self.search.lead = Some(Lead { columns: Arc::new(columns), beginnings: Arc::new(beginnings) });
         self
     }
 
@@ -629,12 +621,6 @@ impl Law {
     #[must_use]
     pub(crate) fn zones(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Option<Zones> {
         self.acts.zones.as_ref().map(|apart| apart(on, self.shaped(values), coefficients))
-    }
-
-    /// Whether it brings one zone of teeth ahead of the other.
-    #[must_use]
-    pub(crate) fn is_in_zones(&self) -> bool {
-        self.acts.zones.is_some()
     }
 
     /// Which of the shape parameters has this name.
