@@ -699,8 +699,11 @@ impl<'a> RunState<'a> {
             limit: 0.0,
             words: format!(
                 "under {torque_n_m} N·m the output stands {:.0} arcsec against its load: friction between the flanks \
-                 ({friction}) rules the sign, not the stiffness",
-                value.abs()
+                 ({friction}) rules the sign, not the stiffness{}",
+                value.abs(),
+                metrics.friction_over_load().map_or_else(String::new, |times| format!(
+                    ", as sliding takes {times:.1} times the work of the load"
+                ))
             ),
         });
         let stiff = Caution::of_stiffness(self.drive);
