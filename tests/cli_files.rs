@@ -112,6 +112,13 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
     assert!(made["caution"].is_null() && desk.read("like.toml").contains("\nkind = \"cup\""), "{made}");
     assert_eq!(made["teeth"]["clear"].as_array().unwrap().len(), 4);
     assert!(desk.read("like.toml").contains("\nratcheting_torque_n_m = 880.0\n"), "{}", desk.read("like.toml"));
+    // The share of the empirical term goes with its table.
+    let short = "--mesh coarse --temperatures-c=20 --positions 4 --most-nodes 5 --torque-n-m 30 --no-report --out like";
+    desk.line(&format!("tables --generator cam --drive like.toml {short}")).done();
+    let info = desk.read("like/cam.json");
+    let flown = desk.line("fly camera --tables like/cam.fxt --no-report --out like --json").done().json();
+    let percent = flown["empirical_percent"].as_f64().unwrap();
+    assert!((30.0..60.0).contains(&percent) && info.contains(&format!(" {percent} % are empirical")), "{percent}");
     // What was set is not guessed.
     let own = "new wide.toml --like CSG-25-80 --bore 62.4 --no-run --set flexspline.width_mm=40 --set \
                generator.bearing_stiffness_n_per_mm3=5000";

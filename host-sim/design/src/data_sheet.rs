@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::pitch_wave::peak_to_peak;
-use crate::simulate::{TipContact, peak_stress};
+use crate::simulate::{TipContact, judged_fillet_mpa, peak_stress};
 use flexspline_base::robust::least_and_most;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Generators};
@@ -184,6 +184,9 @@ pub struct DataSheet {
     /// Largest von Mises stress in the root fillets of the flexspline, MPa, by the strain of their surface:
     /// `simulate --stress` says what it tends to with the mesh.
     pub root_fillet_mpa: Option<f64>,
+    /// The same as cautions judge it, in the second place.
+    #[serde(skip)]
+    pub judged_fillet_mpa: Option<[f64; 2]>,
     /// The largest on the bore, MPa, nodal.
     pub bore_mpa: Option<f64>,
     /// Largest pressure between flanks, MPa.
@@ -215,7 +218,7 @@ impl DataSheet {
             rigid_gap_um: self.rigid_gap_um,
             room_as_built_arcsec: self.room_as_built_arcsec,
             max_von_mises_mpa: self.max_von_mises_mpa,
-            root_fillet_mpa: self.root_fillet_mpa,
+            root_fillet_mpa: self.judged_fillet_mpa,
             peak_flank_pressure_mpa: self.peak_flank_pressure_mpa,
             tip_contact: self.tip_contact,
             slope_bound: None,
@@ -271,6 +274,10 @@ pub fn data_sheet(
     if let (Err(SolveError::NotConverged { reached_n_m, .. }), Some(last)) = (&done, &mut sheet.last_stable_n_m) {
         *last = last.max(*reached_n_m);
     }
+    // It was found whole pitches away from angle 0.
+    let at = (0.0, loads.largest_n_m);
+    sheet.judged_fillet_mpa =
+        sheet.root_fillet_mpa.map(|by_run| judged_fillet_mpa(drive, kind, temperature_c, at, settings, by_run));
     (sheet, done)
 }
 
@@ -359,7 +366,8 @@ mod tests {
 
     #[test]
     fn cautions_look_at_the_stress_in_root_fillets_too() {
-        let sheet = DataSheet { max_von_mises_mpa: Some(664.0), root_fillet_mpa: Some(1204.0), ..DataSheet::default() };
+        let judged_fillet_mpa = Some([1777.0, 1204.0]);
+        let sheet = DataSheet { max_von_mises_mpa: Some(664.0), judged_fillet_mpa, ..DataSheet::default() };
         assert_eq!(sheet.looked().cautions()[0].figure, "root_fillet_mpa");
     }
 }

@@ -28,6 +28,7 @@ use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Face, Increment, Problem, SolveError, Solver, SolverSettings, State};
 
 pub use path::{Path, PathError, PathPoint, read_path};
+pub(crate) use places::judged_fillet_mpa;
 pub use places::{MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, on_mesh, stress_by_place};
 pub use row::Row;
 pub use stress::{PeakStress, peak_stress};
@@ -681,7 +682,10 @@ impl<'a> RunState<'a> {
             rigid_gap_um: rigid_gap_um(self.drive, settings.generator),
             room_as_built_arcsec: room_as_built_arcsec(self.drive, settings.generator),
             max_von_mises_mpa: Some(peak.von_mises_mpa),
-            root_fillet_mpa: Some(self.by_place_mpa[0]),
+            root_fillet_mpa: rows.iter().find(|row| row.step == peak_step).map(|row| {
+                let (kind, at) = (settings.generator, (row.generator_rad, row.torque_n_m));
+                judged_fillet_mpa(self.drive, kind, row.temperature_c, at, settings.solver, self.by_place_mpa[0])
+            }),
             peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
             tip_contact,
             slope_bound: None,
@@ -695,8 +699,11 @@ impl<'a> RunState<'a> {
             limit: 0.0,
             words: format!(
                 "under {torque_n_m} N·m the output stands {:.0} arcsec against its load: friction between the flanks \
-                 ({friction}) rules the sign, not the stiffness",
-                value.abs()
+                 ({friction}) rules the sign, not the stiffness{}",
+                value.abs(),
+                metrics.friction_over_load().map_or_else(String::new, |times| format!(
+                    ", as sliding takes {times:.1} times the work of the load"
+                ))
             ),
         });
         let stiff = Caution::of_stiffness(self.drive);

@@ -373,6 +373,13 @@ fn dwell(rows: &[Row], at: usize, ratio: f64) -> Option<f64> {
 }
 
 impl Metrics {
+    /// Work that is lost between the flanks over the work of load and drag, by the torque of the generator: above 1 a
+    /// load does not turn the generator, whichever way it acts.
+    pub fn friction_over_load(&self) -> Option<f64> {
+        let without = self.generator_torque_expected?;
+        Some(((self.generator_torque? - without) / without).abs())
+    }
+
     /// `repeats`: the drive passes through the same states after every pitch.
     pub(super) fn new(rows: &[Row], pitch: f64, ratio: f64, repeats: bool) -> Metrics {
         let stretches = stretches(rows, pitch);
@@ -543,6 +550,9 @@ mod tests {
         let expected = metrics.generator_torque_expected.unwrap();
         assert!((metrics.generator_torque.unwrap() - expected).abs() < 1e-12);
         assert!((expected + 50.0 / 95.0).abs() < 1e-12);
+        // Driven instead of driving: friction takes twice what the load gives.
+        let driven = Metrics { generator_torque: Some(-expected), ..metrics };
+        assert_eq!((driven.friction_over_load(), Metrics::default().friction_over_load()), (Some(2.0), None));
     }
 
     #[test]

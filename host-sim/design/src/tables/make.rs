@@ -8,14 +8,13 @@ use thiserror::Error;
 
 use super::complete::{CompletionError, KNEE_NODES, SheetStiffness};
 use super::info::MadeTable;
-use super::project::{TableError, from_sweep};
+use super::project::{TableError, empirical_percent, from_sweep};
 use super::sweep::{Sampler, SweepPlan, SweepProgress, TorqueSweepError, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
 use crate::cautions::{Caution, LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::Stiffness;
 use crate::relief::tips_that_bear;
-use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 
@@ -202,15 +201,14 @@ pub fn make(
     };
     made.info.torque_nodes_resolved = Some(chosen.resolved);
     let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
-    if drive.output.contact_compliance > 0.0 {
-        let empirical = drive.contact_wind_up_rad(largest_n_m) * ARCSEC_PER_RAD;
+    let table = flexspline::Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
+    made.info.remarks.extend(empirical_percent(&table).map(|percent| {
         let [_, whole] = made.info.wind_up_arcsec;
-        made.info.remarks.push(format!(
-            "of the wind-up of {whole:.1} arcsec at {largest_n_m} N·m {empirical:.1}, {:.0} %, are empirical \
-             (output.contact_compliance), not FEM",
-            100.0 * empirical / whole
-        ));
-    }
+        format!(
+            "of the wind-up of {whole:.1} arcsec at {largest_n_m} N·m {percent} % are empirical \
+             (output.contact_compliance), not FEM"
+        )
+    }));
     let looked = LookedAt {
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),
@@ -221,8 +219,7 @@ pub fn make(
         slope_bound: Some(f64::from(made.info.slope_bound)),
     };
     made.info.cautions = Caution::of_stiffness(drive).into_iter().chain(looked.cautions()).collect();
-    made.info.stiffness =
-        flexspline::Table::check(&made.image).ok().and_then(|table| Stiffness::of_table(drive, &table));
+    made.info.stiffness = Stiffness::of_table(drive, &table);
     Ok(made)
 }
 

@@ -22,8 +22,7 @@ pub use complete::{Completed, CompletionError, MissingSpring, SheetStiffness, Sl
 pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 pub use make::{MakeError, TableObserver, TableProgress, TableSettings, make};
 pub use positions::places_that_tell_apart;
-pub use project::from_plan;
-pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples};
+pub use project::{SampleOptions, TableError, core_drive, core_kind, empirical_percent, from_plan, from_samples};
 pub use source_files::put_bytes;
 pub use source_files::{c_header, rust_source};
 pub use sweep::{SweepProgress, TorqueSweepError};

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use flexspline::Table;
+use flexspline_design::tables::empirical_percent;
 use flexspline_fmu::instance::CATEGORIES;
 use flexspline_fmu::resources::Resources;
 use flexspline_fmu::variables::{Choices, FmiRole, FmiType, ModelKind, UNITS, Variable};
@@ -21,8 +22,8 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-fn about(kind: ModelKind) -> &'static str {
-    match kind {
+fn about(resources: &Resources) -> String {
+    let model = match resources.kind {
         ModelKind::Compensation => {
             "Compensation of a strain wave drive: where to turn its generator so that the output comes to where it is \
              wanted"
@@ -30,7 +31,10 @@ fn about(kind: ModelKind) -> &'static str {
         ModelKind::Joint => {
             "A joint with mass: motor, servo, strain wave drive and load, with and without compensation"
         }
-    }
+    };
+    let percent = Table::check(&resources.image).ok().and_then(|table| empirical_percent(&table));
+    let part = percent.map(|percent| format!("; {percent} % of the wind-up of its table are empirical, not FEM"));
+    model.to_owned() + &part.unwrap_or_default()
 }
 
 /// The whole file. A state is kept, read and set; steps are of any length.
@@ -52,7 +56,7 @@ pub(super) fn xml(resources: &Resources) -> String {
 "#,
         name = kind.name(),
         guid = resources.guid,
-        about = about(kind),
+        about = about(resources),
         version = env!("CARGO_PKG_VERSION"),
         identifier = kind.identifier(),
     );
@@ -193,7 +197,7 @@ pub(super) fn page(resources: &Resources) -> String {
          within it, and carries the rest over to the \
          next.</p>\n<table><tr><th>variable<th>unit<th>is<th>start<th>what\n",
         name = kind.name(),
-        about = about(kind),
+        about = about(resources),
         ratio = resources.start("ratio"),
         id = resources.table_id,
     );

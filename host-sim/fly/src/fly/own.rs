@@ -1,7 +1,7 @@
 //! The drive that a table describes, flown in the place of HHD-95.
 
 use flexspline::{Direction, GeneratorAngle, ImageError, Table};
-use flexspline_design::tables::generator_of;
+use flexspline_design::tables::{empirical_percent, generator_of};
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_motion::flight::{JointUnit, TABLE_DRAG_N_M};
 use flexspline_motion::gear::Gear;
@@ -75,6 +75,8 @@ pub struct OwnDrive {
     pub(super) unit: JointUnit,
     /// Largest torque that the table has, N·m.
     pub(super) largest_n_m: f64,
+    /// Percent of its wind-up that are empirical.
+    pub(super) empirical_percent: Option<f64>,
 }
 
 impl OwnDrive {
@@ -85,6 +87,7 @@ impl OwnDrive {
             kind: generator_of(&table).ok_or(OwnTableError::NoGear)?,
             unit: JointUnit::of_gear(*table.drive(), gear_at(&table, temperature_c)?),
             largest_n_m: f64::from(table.torque_range_n_m()[1]),
+            empirical_percent: empirical_percent(&table),
         })
     }
 }

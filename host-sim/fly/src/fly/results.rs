@@ -96,6 +96,9 @@ pub struct Results {
     pub servo_distance: f64,
     /// Resonances with motor held and free, Hz.
     pub resonances_hz: [f64; 2],
+    /// Percent of the wind-up of the table's drive at its largest torque that are no FEM; left out where all is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub empirical_percent: Option<f64>,
     /// Objections to the flight, in sentences; empty if it is sound.
     pub remarks: Vec<String>,
     /// Ticks in which the motor gave all it has, the limiter held back, nothing was corrected, with the core.
@@ -121,6 +124,7 @@ impl Results {
             ("removed by the core", percent(self.removed.filter(|_| self.stable)), "%", 1, "of what an ideal removes"),
             ("phase margin of the servo", of_margin(margin), "deg", 0, at.as_str()),
             ("its least distance from -1", of_margin(self.servo_distance), "", 2, ""),
+            ("empirical part of the wind-up", self.empirical_percent, "%", 0, "output.contact_compliance, not FEM"),
             ("resonance of the held motor", Some(held), "Hz", 0, ""),
             ("resonance of the free motor", Some(free), "Hz", 0, ""),
             ("low-pass of the torque", Some(self.bandwidth_hz), "Hz", 2, ""),
@@ -225,6 +229,7 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
         phase_margin_deg: flight.phase_margin_deg,
         servo_distance: flight.servo_distance,
         resonances_hz: flight.resonances_hz,
+        empirical_percent: flown.own.as_ref().and_then(|own| own.empirical_percent),
         remarks: Vec::new(),
         limited_ticks: core.limits,
         torque_within_bound: current.then_some(core.within_bound),
