@@ -366,6 +366,7 @@ impl Table {
                 error_arcsec: error.at(row),
                 torque_n_m: torque.at(row),
                 temperature_c: temperature.at(row),
+                session: 0,
             })
             .collect();
         self.replayed(py, RowsRead { rows, faults: Vec::new(), notes: Vec::new() }, None)

@@ -629,6 +629,7 @@ fn report(
     let Fitted { rows, folds, model, held_out, .. } = fitted;
     let torque_from_wind_up = WindUpTorque::of(&rows, &folds, &model, prior).filter(|_| recorded.has_torque);
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
+    let torque_from_wind_up = torque_from_wind_up.map(|of| of.over_all(files, &image, recorded.temperature_c));
     let core = ByCore::of(files, &image, recorded);
     let mut readings = delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
     let delay = delay_note(&readings, files.len());
