@@ -198,6 +198,13 @@ fn vertex([before, at, after]: [f64; 3]) -> f64 {
     if curve > 0.0 { (0.5 * (before - after) / curve).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
+/// Residual of the prior with a zero for each log, and with what load and direction may add, arcsec rms.
+pub(super) fn left_beside_load(rows: &Rows, ratio: f64, friction_n_m: f64) -> f64 {
+    let of = (rows.rows.iter(), (|row| row.left_arcsec) as fn(&Row) -> f64);
+    let search = PhaseSearch::new(&|_| 0.0, ratio, of, friction_n_m, FOUND_WITH);
+    (search.squares(0.0) / search.at.len().max(1) as f64).sqrt()
+}
+
 /// Finds the phase of a table against logs.
 pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignment {
     let says = |at: &State| steady(table, at, 0.0);
