@@ -143,7 +143,7 @@
 //! # let made = table_of_samples(&Drive::hhd_95(), GeneratorKind::Cam, &samples, "cam", &bytes, options)?;
 //! # let table = flexspline::Table::check(&made.image)?;
 //!
-//! let still = MeasuredRow { generator_rad: 0.0, error_arcsec: 0.0, torque_n_m: 5.0, temperature_c: 20.0 };
+//! let still = MeasuredRow { generator_rad: 0.0, error_arcsec: 0.0, torque_n_m: 5.0, temperature_c: 20.0, session: 0 };
 //! let row = |k| MeasuredRow { generator_rad: 0.01 * f64::from(k), ..still };
 //! let (rows, summary) = replay(&table, &(0..50).map(row).collect::<Vec<_>>(), None);
 //! assert_eq!((rows.len(), rows[49].quality), (50, "in range"));

@@ -148,7 +148,13 @@ mod tests {
                 let generator = GeneratorAngle::from_rad(generator_rad).unwrap();
                 let said = table.forward(&mut play, generator, torque_n_m as f32, 20.0);
                 let error_arcsec = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
-                MeasuredRow { generator_rad, error_arcsec, torque_n_m: sign * torque_n_m, temperature_c: 20.0 }
+                MeasuredRow {
+                    generator_rad,
+                    error_arcsec,
+                    torque_n_m: sign * torque_n_m,
+                    temperature_c: 20.0,
+                    session: 0,
+                }
             };
             (0..1500).map(row).collect()
         };

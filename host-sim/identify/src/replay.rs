@@ -13,11 +13,11 @@ use thiserror::Error;
 use crate::calibrate::{CalibrationError, INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
 use crate::known_rows::parse_known;
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Treatment, quantile_of, white_noise,
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, quantile_of, white_noise,
 };
 use crate::misfit::{Misfit, TurnsOff, about_mean};
 use crate::nominal::Nominal;
-use crate::wind_up::WindUpCurve;
+use crate::wind_up::along;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::generator_of;
 
@@ -32,6 +32,8 @@ pub struct MeasuredRow {
     pub torque_n_m: f64,
     /// Temperature, °C.
     pub temperature_c: f64,
+    /// Rows without a gap have the same: of each the output has a zero of its own.
+    pub session: usize,
 }
 
 /// A row of `replay.csv`.
@@ -269,16 +271,25 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
             "no torque: the table is read at 0 N·m, and the torque from the wind-up counts from that of the mean row";
         recording.notes.push(what.to_owned());
     }
-    let rows = recording.sessions.iter().flat_map(|session| {
+    let rows = measured_rows(&recording.sessions, temperature_c).collect();
+    Ok(RowsRead { rows, faults: recording.faults, notes: recording.notes })
+}
+
+/// The rows of sessions; `temperature_c` stands where none was recorded.
+pub(crate) fn measured_rows<'a>(
+    sessions: impl IntoIterator<Item = &'a Session>,
+    temperature_c: f64,
+) -> impl Iterator<Item = MeasuredRow> {
+    sessions.into_iter().enumerate().flat_map(move |(number, session)| {
         let measured = session.states(temperature_c).zip(&session.error_rad);
-        measured.map(|([generator_rad, torque_n_m, temperature_c], error)| MeasuredRow {
+        measured.map(move |([generator_rad, torque_n_m, temperature_c], error)| MeasuredRow {
             generator_rad,
             error_arcsec: error * ARCSEC_PER_RAD,
             torque_n_m,
             temperature_c,
+            session: number,
         })
-    });
-    Ok(RowsRead { rows: rows.collect(), faults: recording.faults, notes: recording.notes })
+    })
 }
 
 /// The core over rows of generator angle (rad), torque (N·m) and temperature (°C), from a state it does not know.
@@ -326,7 +337,7 @@ pub fn replay(
             }
         })
         .collect();
-    read_torques(table, &mut replayed, wind_up);
+    read_torques(table, rows, &mut replayed, wind_up);
     let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
     let count = replayed.len().max(1) as f64;
     let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
@@ -356,24 +367,29 @@ pub fn replay(
     (replayed, summary)
 }
 
-/// Puts in the torques that the wind-up says, the mean residual taken for the zero of the output. The intervals are of
-/// what the calibration left of rows that it did not see. Without one they are of what the table leaves of the rows;
-/// without a torque, of the noise of the rows and of what the table leaves of its samples.
-fn read_torques(table: &Table<'_>, rows: &mut [ReplayedRow], calibrated: Option<WindUpTorque>) {
-    let zero = rows.iter().map(|row| row.residual_arcsec).sum::<f64>() / rows.len().max(1) as f64;
+/// Puts in the torques that the wind-up says. The intervals are of what the calibration left. Without one they are of
+/// what the table leaves of the rows; without a torque, of the noise of the rows and of what the table leaves of its
+/// samples.
+fn read_torques(
+    table: &Table<'_>,
+    rows: &[MeasuredRow],
+    replayed: &mut [ReplayedRow],
+    calibrated: Option<WindUpTorque>,
+) {
     let half_width_arcsec = if let Some(calibrated) = &calibrated {
         calibrated.half_width_arcsec
     } else if rows.iter().any(|row| row.torque_n_m != 0.0) {
-        quantile_of(&mut rows.iter().map(|row| (row.residual_arcsec - zero).abs()).collect::<Vec<f64>>(), INSIDE)
+        let zero = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / replayed.len().max(1) as f64;
+        quantile_of(&mut replayed.iter().map(|row| (row.residual_arcsec - zero).abs()).collect::<Vec<f64>>(), INSIDE)
     } else {
-        let errors: Vec<f64> = rows.iter().map(|row| row.measured_arcsec).collect();
+        let errors: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
         OF_95 * white_noise([&errors[..]]).hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)
     };
     let hysteresis = calibrated.and_then(|calibrated| calibrated.hysteresis).unwrap_or_default();
-    let mut wind_up = WindUpCurve::new(table, PlayState::unknown()).with(hysteresis);
-    for row in rows {
-        let [error, half_width] = [row.measured_arcsec - zero, half_width_arcsec].map(|arcsec| arcsec / ARCSEC_PER_RAD);
-        let torque = wind_up.read(row.generator_rad, error, row.temperature_c, half_width);
+    let torques = along(table, rows, &hysteresis, |curve, row, error_rad| {
+        curve.read(row.generator_rad, error_rad, row.temperature_c, half_width_arcsec / ARCSEC_PER_RAD)
+    });
+    for (row, torque) in replayed.iter_mut().zip(torques) {
         [row.torque_from_wind_up_n_m, row.torque_from_wind_up_low_n_m, row.torque_from_wind_up_high_n_m] = torque;
     }
 }

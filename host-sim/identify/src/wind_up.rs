@@ -13,6 +13,10 @@ use flexspline::{Direction, GeneratorAngle, PlayState, Table};
 use flexspline_design::tables::SlipSpring;
 use serde::{Deserialize, Serialize};
 
+use crate::replay::{MeasuredRow, by_core};
+use flexspline_base::statistics::mean;
+use flexspline_base::units::ARCSEC_PER_RAD;
+
 /// Halvings of the range of a table: to a millionth of it. *Guess*.
 const HALVINGS: u32 = 20;
 /// Share of the newest torque in that by which play and springs are moved: the noise of one row would move the output
@@ -114,36 +118,77 @@ impl<'t> WindUpCurve<'t> {
     /// on the zero of the table) and what the table has are right to `half_width_rad`; within the table's range. NaN
     /// where a reading is not finite.
     pub fn read(&mut self, generator_rad: f64, error_rad: f64, temperature_c: f64, half_width_rad: f64) -> [f64; 3] {
-        let Some(generator) = GeneratorAngle::from_rad(generator_rad) else { return [f64::NAN; 3] };
+        let range = self.table.torque_range_n_m().map(f64::from);
+        self.next(generator_rad, temperature_c, |error_at| {
+            [0.0, -1.0, 1.0].map(|end| load_of(|load| error_at(load, -end), range, error_rad + end * half_width_rad))
+        })
+    }
+
+    /// The same, and in place of the ends the half width that an interval needs to hold a torque that is known, rad.
+    pub(crate) fn needs(&mut self, row: &MeasuredRow, error_rad: f64) -> [f64; 2] {
+        let range = self.table.torque_range_n_m().map(f64::from);
+        self.next(row.generator_rad, row.temperature_c, |error_at| {
+            let [below, above] = [1.0, -1.0].map(|end| end * (error_rad - error_at(row.torque_n_m, end)));
+            [load_of(|load| error_at(load, 0.0), range, error_rad), below.max(above).max(0.0)]
+        })
+    }
+
+    /// What is read at the next angle of the generator, the torque first, by the error there under a load; the output
+    /// rests where it is taken to, or at an end, -1 or 1, of where it may.
+    fn next<const N: usize>(
+        &mut self,
+        generator_rad: f64,
+        temperature_c: f64,
+        read: impl FnOnce(&dyn Fn(f64, f64) -> f64) -> [f64; N],
+    ) -> [f64; N] {
+        let Some(generator) = GeneratorAngle::from_rad(generator_rad) else { return [f64::NAN; N] };
         let steady = |torque_n_m: f64, way: Direction| {
             let error = self.table.steady_error_rad(generator, torque_n_m as f32, temperature_c as f32, way);
             error.map_or(f64::NAN, f64::from)
         };
         let before = self.held.torque_n_m;
         let [forward, backward] = [Direction::Forward, Direction::Backward].map(|way| steady(before, way));
-        if !(error_rad + forward + backward + half_width_rad).is_finite() {
-            return [f64::NAN; 3];
-        }
         let _ = self.table.forward(&mut self.play, generator, before as f32, temperature_c as f32);
         let half = 0.5 * (backward - forward).abs().max(f64::MIN_POSITIVE);
-        let (offset, doubt) = (f64::from(self.play.offset_rad()), f64::from(self.play.uncertainty_rad()));
-        let range = self.table.torque_range_n_m().map(f64::from);
-        let load = |error: f64, offset: f64| {
-            let s = (offset / half).clamp(-1.0, 1.0);
+        let (at_rest, doubt) = (f64::from(self.play.offset_rad()), f64::from(self.play.uncertainty_rad()));
+        let found = read(&|torque: f64, end: f64| {
+            let s = ((at_rest + end * doubt) / half).clamp(-1.0, 1.0);
             // Both flanks are asked only where the output rests between them.
-            let at = |torque: f64| {
-                let of = |share: f64, way: Direction| if share > 0.0 { share * steady(torque, way) } else { 0.0 };
-                0.5 * (of(1.0 - s, Direction::Forward) + of(1.0 + s, Direction::Backward))
-                    + self.hysteresis.error_rad(&self.held, torque)
-            };
-            load_of(at, range, error)
-        };
-        let torque = load(error_rad, offset);
-        let low = load(error_rad - half_width_rad, offset + doubt);
-        let high = load(error_rad + half_width_rad, offset - doubt);
-        self.held.follow(torque, self.hysteresis.springs.iter().map(|spring| spring.width_n_m));
-        [torque, low, high]
+            let of = |share: f64, way: Direction| if share > 0.0 { share * steady(torque, way) } else { 0.0 };
+            0.5 * (of(1.0 - s, Direction::Forward) + of(1.0 + s, Direction::Backward))
+                + self.hysteresis.error_rad(&self.held, torque)
+        });
+        if !found.iter().all(|value| value.is_finite()) || !(forward + backward).is_finite() {
+            return [f64::NAN; N];
+        }
+        self.held.follow(found[0], self.hysteresis.springs.iter().map(|spring| spring.width_n_m));
+        found
     }
+}
+
+/// Reads the error of rows by a curve, each session from a state that is not known, on its zero of the output: the mean
+/// of what table and hysteresis leave under the torques recorded; without any, that of all rows.
+pub(crate) fn along<R>(
+    table: &Table<'_>,
+    rows: &[MeasuredRow],
+    hysteresis: &Hysteresis,
+    mut read: impl FnMut(&mut WindUpCurve<'_>, &MeasuredRow, f64) -> R,
+) -> Vec<R> {
+    let has_torque = rows.iter().any(|row| row.torque_n_m != 0.0);
+    let mut all = Vec::with_capacity(rows.len());
+    for rows in rows.chunk_by(|row, next| !has_torque || row.session == next.session) {
+        let mut held = HeldTorques::default();
+        let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
+        let left = rows.iter().zip(by_core(table, states)).map(|(row, said)| {
+            let lags = hysteresis.error_rad(&held, row.torque_n_m);
+            held.follow(row.torque_n_m, hysteresis.springs.iter().map(|spring| spring.width_n_m));
+            row.error_arcsec / ARCSEC_PER_RAD - f64::from(said.transmission_error_rad) - lags
+        });
+        let zero = mean(&left.collect::<Vec<f64>>());
+        let mut curve = WindUpCurve::new(table, PlayState::unknown()).with(hysteresis.clone());
+        all.extend(rows.iter().map(|row| read(&mut curve, row, row.error_arcsec / ARCSEC_PER_RAD - zero)));
+    }
+    all
 }
 
 #[cfg(test)]

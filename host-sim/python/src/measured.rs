@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use flexspline::Table;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
-use flexspline_identify::calibrate::{CalibrationError, Prior, calibrate as fit};
+use flexspline_identify::calibrate::{CalibrationError, Prior, calibrate as fit, calibrate_and_split};
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::{
     Explanation, PipelineError, Series, Settings, Subject, diagnose_rows, parse_rows,
@@ -131,13 +131,15 @@ pub fn synthesize(
 
 /// Logs of one unit to its table: the text of `calibration.json`, the table, and the rows of a picture.
 #[pyfunction]
-#[pyo3(signature = (logs, known, generator_name, reading, *, threads, progress))]
+#[pyo3(signature = (logs, known, generator_name, reading, split, *, threads, progress))]
+#[expect(clippy::too_many_arguments, reason = "those of Python")]
 pub fn calibrate<'py>(
     py: Python<'py>,
     logs: Vec<LogFrom>,
     known: KnownFrom,
     generator_name: &str,
     reading: Reading,
+    split: bool,
     threads: Option<usize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(String, Parts<'py>, Bound<'py, PyDict>)> {
@@ -168,7 +170,8 @@ pub fn calibrate<'py>(
         let causes = causes.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PythonFailure::bad)?;
         let prior = causes.as_ref().map_or(prior, |table| Prior::of_table(table, kind));
         watch.tell_or_unwind(logs.len(), logs.len() + 1, "fitting".to_owned());
-        let made = fit(&files, &prior).map_err(|error| calibration_failure(&error, &logs))?;
+        let made = if split { calibrate_and_split } else { fit }(&files, &prior)
+            .map_err(|error| calibration_failure(&error, &logs))?;
         watch.tell_or_unwind(logs.len() + 1, logs.len() + 1, "done".to_owned());
         Ok((made.calibration, made.table, made.shown))
     })?;

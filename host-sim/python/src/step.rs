@@ -7,8 +7,8 @@ use flexspline::{Approach, Direction, GeneratorAngle, OutputAngle, PlayState as 
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{dead_zone_n_m, generator_of};
 use flexspline_identify::measurement::{ColumnMap, bytes_of};
-use flexspline_identify::replay::{MeasuredRow, RowsOf, RowsRead, read, replay};
-use flexspline_identify::wind_up::WindUpCurve;
+use flexspline_identify::replay::{MeasuredRow, ReplayedRow, RowsOf, RowsRead, read, replay};
+use flexspline_identify::wind_up::{Hysteresis, WindUpCurve};
 use flexspline_mechanics::drive::GeneratorKind;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
@@ -304,7 +304,7 @@ impl Table {
     }
 
     /// Torques by wind-up. With `direction` each row for itself, in steady motion; else in row order from `state`,
-    /// which stays.
+    /// which stays, and with the `hysteresis` of a calibration.
     #[expect(clippy::too_many_arguments, reason = "each is a column")]
     fn torque(
         &self,
@@ -315,6 +315,7 @@ impl Table {
         half_width_rad: In<'_>,
         direction: Option<In<'_, i8>>,
         state: Option<&PlayState>,
+        hysteresis: Option<&str>,
         mut torque_n_m: Out<'_, f64>,
         mut low_n_m: Out<'_, f64>,
         mut high_n_m: Out<'_, f64>,
@@ -331,7 +332,8 @@ impl Table {
         angles("generator_rad", generator)?;
         let ratio = table.drive().exact_ratio();
         let sides = directions(direction.as_ref(), rows)?;
-        let mut wind_up = WindUpCurve::new(table, state.map_or(CoreState::unknown(), PlayState::get));
+        let hysteresis = hysteresis.map_or(Ok(Hysteresis::default()), serde_json::from_str).map_err(bad)?;
+        let mut wind_up = WindUpCurve::new(table, state.map_or(CoreState::unknown(), PlayState::get)).with(hysteresis);
         for_rows(py, rows, |row| {
             if let Some(sides) = &sides {
                 wind_up = WindUpCurve::new(table, CoreState::after_motion(sides.at(row)));
@@ -366,6 +368,7 @@ impl Table {
                 error_arcsec: error.at(row),
                 torque_n_m: torque.at(row),
                 temperature_c: temperature.at(row),
+                session: 0,
             })
             .collect();
         self.replayed(py, RowsRead { rows, faults: Vec::new(), notes: Vec::new() }, None)
@@ -400,9 +403,7 @@ impl Table {
         (summary.data_faults, summary.notes) = (faults, notes);
         summary.of_rows(rows_of, self.table());
         let columns = PyDict::new(py);
-        let numbers = |of: fn(&flexspline_identify::replay::ReplayedRow) -> f64| {
-            replayed.iter().map(of).collect::<Vec<f64>>().into_pyarray(py)
-        };
+        let numbers = |of: fn(&ReplayedRow) -> f64| replayed.iter().map(of).collect::<Vec<f64>>().into_pyarray(py);
         columns.set_item("generator_rad", numbers(|row| row.generator_rad))?;
         columns.set_item("torque_n_m", numbers(|row| row.torque_n_m))?;
         columns.set_item("temperature_c", numbers(|row| row.temperature_c))?;
@@ -410,13 +411,9 @@ impl Table {
         columns.set_item("predicted_arcsec", numbers(|row| row.predicted_arcsec))?;
         columns.set_item("residual_arcsec", numbers(|row| row.residual_arcsec))?;
         columns.set_item("uncertainty_arcsec", numbers(|row| row.uncertainty_arcsec))?;
-        let quality = replayed.iter().map(|row| match row.quality {
-            "in range" => 0,
-            "uncertain" => 1,
-            "extrapolated" => 2,
-            _ => 3u8,
-        });
-        columns.set_item("quality", quality.collect::<Vec<u8>>().into_pyarray(py))?;
+        let names = ["in range", "uncertain", "extrapolated"];
+        let quality = |row: &ReplayedRow| names.iter().position(|name| *name == row.quality).unwrap_or(3) as u8;
+        columns.set_item("quality", replayed.iter().map(quality).collect::<Vec<u8>>().into_pyarray(py))?;
         columns.set_item("torque_from_wind_up_n_m", numbers(|row| row.torque_from_wind_up_n_m))?;
         columns.set_item("torque_from_wind_up_low_n_m", numbers(|row| row.torque_from_wind_up_low_n_m))?;
         columns.set_item("torque_from_wind_up_high_n_m", numbers(|row| row.torque_from_wind_up_high_n_m))?;

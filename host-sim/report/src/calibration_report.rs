@@ -5,7 +5,7 @@ use serde_json::{Map, json};
 use super::page::{
     ChartAxis, ChartSeries, Choice, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText, Status,
 };
-use flexspline_identify::calibrate::{Calibrated, Calibration, PartSays};
+use flexspline_identify::calibrate::{Calibrated, Calibration, PartSays, Split, SplitPart};
 
 /// Points of a series on the page, at most.
 const MOST_POINTS: usize = 4000;
@@ -14,6 +14,11 @@ const MOST_POINTS: usize = 4000;
 #[must_use]
 pub fn page(made: &Calibrated) -> Page {
     let c = &made.calibration;
+    let reading = PageSection::reading(vec![PageBlock::paragraph(
+        "A table of one unit says what its error is, not why: two causes that look alike in these logs are one part \
+         here. It holds for the torques, temperatures and angles recorded. Held-out figures leave out each \
+         file or block in turn: parts, smoothness and coefficients are found without it.",
+    )]);
     Page {
         title: format!("Calibration of one unit, ratio {}", c.ratio),
         command_name: "calibrate",
@@ -23,7 +28,7 @@ pub fn page(made: &Calibrated) -> Page {
         choices: vec![Choice { id: "unit".to_owned(), name: "this unit".to_owned() }],
         choice_is: "unit",
         headlines: vec![headline(c)],
-        sections: vec![left(made), parts(c), reading()],
+        sections: [left(made), parts(c)].into_iter().chain(c.split.as_ref().map(split)).chain([reading]).collect(),
         provenance: vec![
             ("command".to_owned(), c.command.clone()),
             ("table_id".to_owned(), c.table_id.clone()),
@@ -94,10 +99,12 @@ fn parts(c: &Calibration) -> PageSection {
     PageSection::new("parts", "Its parts", vec![table])
 }
 
-fn reading() -> PageSection {
-    PageSection::reading(vec![PageBlock::paragraph(
-        "A table of one unit says what its error is, not why: two causes that look alike in these logs are one part \
-         here. It holds for the torques, temperatures and angles recorded. Held-out figures leave out each \
-         file or block in turn: parts, smoothness and coefficients are found without it.",
-    )])
+fn split(split: &Split) -> PageSection {
+    let row = |part: &SplitPart| {
+        let [rms, half_width] = [part.rms_arcsec, part.half_width_arcsec].map(|arcsec| RichText::arcsec(arcsec, 3));
+        vec![part.of.replace('_', " ").into(), rms, half_width]
+    };
+    let header = ["Part", "Error at the output, rms", "± (95 %)"];
+    let rows = split.parts.iter().map(row).collect();
+    PageSection::new("split", "Encoder or gear", vec![PageBlock::table("What each has of the error", &header, rows)])
 }

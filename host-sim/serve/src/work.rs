@@ -261,6 +261,7 @@ impl WorkAsked {
             }
             WorkAsked::Calibrate { files, reading, known, generator } => {
                 words.logs(files)?;
+                words.word("--split");
                 words.known(known, true)?;
                 words.option("generator", generator);
                 words.reading(reading)?;
@@ -521,7 +522,7 @@ mod tests {
         .unwrap();
         assert_eq!(
             shown(&words, "bench/x-1"),
-            "flexspline calibrate a.csv --ratio=-100 --generator=cam \
+            "flexspline calibrate a.csv --split --ratio=-100 --generator=cam \
              '--columns=generator=#1:turn,error=it'\\''s:arcsec' --rate=100 --out=bench/x-1"
         );
         let words = asked(r#"{"work":"look","files":["a.csv"]}"#).unwrap();

@@ -132,27 +132,15 @@ impl BenchOptions {
 /// Entries of an encoder's table, unless they are said. *Guess*.
 const USUAL_ENTRIES: usize = 256;
 
-/// What is no `N` or `N:COUNTS`.
-#[derive(Debug)]
-struct NoEncoderTable;
-
-impl std::fmt::Display for NoEncoderTable {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("allowed: 2 to 65536 entries, as in 32, or with the counts in a turn, as in 32:4096")
-    }
-}
-
-impl std::error::Error for NoEncoderTable {}
-
 /// Reads `N` or `N:COUNTS`.
-fn encoder_table(text: &str) -> Result<(usize, Option<f64>), NoEncoderTable> {
+fn encoder_table(text: &str) -> Result<(usize, Option<f64>), &'static str> {
     let (entries, counts) = text.split_once(':').map_or((text, None), |(entries, counts)| (entries, Some(counts)));
     let entries = entries.parse().ok().filter(|entries| (2..=65_536).contains(entries));
     let counts = counts.map(|counts| counts.parse().ok().filter(|counts: &i64| (2..=1 << 40).contains(&counts.abs())));
     match (entries, counts) {
         (Some(entries), None) => Ok((entries, None)),
         (Some(entries), Some(Some(counts))) => Ok((entries, Some(counts as f64))),
-        _ => Err(NoEncoderTable),
+        _ => Err("allowed: 2 to 65536 entries, as in 32, or with the counts in a turn, as in 32:4096"),
     }
 }
 

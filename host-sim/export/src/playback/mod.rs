@@ -262,8 +262,13 @@ mod tests {
 
     #[test]
     fn a_row_at_rest_keeps_its_direction() {
-        let row =
-            |generator_rad| MeasuredRow { generator_rad, error_arcsec: 0.0, torque_n_m: 0.0, temperature_c: 20.0 };
+        let row = |generator_rad| MeasuredRow {
+            generator_rad,
+            error_arcsec: 0.0,
+            torque_n_m: 0.0,
+            temperature_c: 20.0,
+            session: 0,
+        };
         let rows = [0.0, 0.0, 1.0, 1.0, 0.5, 0.5].map(row);
         use Direction::{Backward, Forward};
         assert_eq!(directions_of(&rows, 95.0), [Forward, Forward, Forward, Forward, Backward, Backward]);

@@ -36,6 +36,7 @@ use crate::misfit::LEAVES;
 pub use at_rest::{LoopFigure, TorqueLoop};
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
+use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use flexspline_mechanics::drive::GeneratorKind;
 use folds::{Chosen, Folds};
@@ -522,6 +523,13 @@ fn calibrated(files: &[Recording], prior: &Prior<'_>, split: bool) -> Result<Cal
     } else {
         files
     };
+    let anew = with_zeros_anew(files);
+    let files = if are_set_anew(&anew, files, prior) {
+        said.push(SET_ANEW.to_owned());
+        &anew
+    } else {
+        files
+    };
     let mut recorded = Recorded::of(files, prior);
     let mut rows = settled(files, prior, &recorded);
     let starts = Starts::of(&rows, &recorded, prior, files);
@@ -555,6 +563,20 @@ fn calibrated(files: &[Recording], prior: &Prior<'_>, split: bool) -> Result<Cal
     made.map_err(|error| with_faults(error, files, &notes))
 }
 
+/// Note on sessions of one log that have other zeros.
+const SET_ANEW: &str = "the zero of the output is another one in each session of a log, as where an encoder is set to \
+                        zero anew: each is put on its own";
+
+/// Logs with a zero in each of their sessions.
+fn with_zeros_anew(files: &[Recording]) -> Vec<Recording> {
+    let anew = |file: &Recording| {
+        let mut file = file.clone();
+        file.sessions.iter_mut().for_each(|session| session.own_zero = true);
+        by_zeros(&file)
+    };
+    files.iter().flat_map(anew).collect()
+}
+
 /// A file in pieces, each with one zero.
 fn by_zeros(file: &Recording) -> Vec<Recording> {
     let mut pieces: Vec<Recording> = Vec::new();
@@ -570,6 +592,17 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
         (first.faults, first.notes) = (file.faults.clone(), file.notes.clone());
     }
     pieces
+}
+
+/// Whether sessions have zeros of their own: these leave far less than one zero for each log, whatever load and
+/// direction do in addition.
+fn are_set_anew(anew: &[Recording], files: &[Recording], prior: &Prior<'_>) -> bool {
+    let recorded = Recorded::of(anew, prior);
+    let rows = settled(anew, prior, &recorded);
+    let long = (0..anew.len()).all(|log| rows.rows.iter().filter(|row| row.at.log == log).count() >= FEWEST_ROWS);
+    let left = |rows: &Rows| zero::left_beside_load(rows, recorded.scales.friction_n_m);
+    let sound = anew.len() > files.len() && long && recorded.has_torque && !recorded.each_keeps_to_one_load;
+    sound && left(&rows) < LEAVES * left(&settled(files, prior, &recorded))
 }
 
 /// A generator that started elsewhere is off by more than this beyond the interval, deg. *Guess*: a degree moves a
@@ -601,7 +634,21 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         }
         sessions.extend(piece.sessions);
     }
-    Recording { sessions, ..log }
+    on_one_output_zero(Recording { sessions, ..log }, &prior)
+}
+
+/// A log with the output of each session on the zero of the first, if sessions have zeros of their own by a table.
+fn on_one_output_zero(mut log: Recording, prior: &Prior<'_>) -> Recording {
+    let pieces = with_zeros_anew(std::slice::from_ref(&log));
+    if are_set_anew(&pieces, std::slice::from_ref(&log), prior) {
+        let means = settled(&pieces, prior, &Recorded::of(&pieces, prior)).means_arcsec;
+        let off_arcsec = means.iter().map(|mean| mean - means[0]);
+        for (session, off_arcsec) in log.sessions.iter_mut().zip(off_arcsec) {
+            session.error_rad.iter_mut().for_each(|error| *error -= off_arcsec / ARCSEC_PER_RAD);
+        }
+        log.notes.push(SET_ANEW.to_owned());
+    }
+    log
 }
 
 /// The fit whose table can be made, and that table.
@@ -649,6 +696,7 @@ fn report(
     let Fitted { rows, folds, model, held_out, .. } = fitted;
     let torque_from_wind_up = WindUpTorque::of(&rows, &folds, &model, prior).filter(|_| recorded.has_torque);
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
+    let torque_from_wind_up = torque_from_wind_up.map(|of| of.over_all(files, &image, recorded.temperature_c));
     let core = ByCore::of(files, &image, recorded);
     let mut readings = delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
     let delay = delay_note(&readings, files.len());
@@ -693,9 +741,11 @@ fn report(
     };
     let changes = split.then(|| split::recorded_changes(&rows, &model, prior, known.noise.rms_arcsec));
     let (split, gear) = changes.map(of_whom).transpose()?.unzip();
+    let mut of_files: Vec<String> = files.iter().map(|file| file.file.clone()).collect();
+    of_files.dedup();
     let calibration = Calibration {
         schema_version: 1,
-        files: files.iter().map(|file| file.file.clone()).collect(),
+        files: of_files,
         rows: rows.of,
         rows_fitted: rows.rows.len(),
         rows_unsettled: rows.unsettled,

@@ -252,12 +252,9 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     for (zero, file) in files.iter().enumerate() {
         let begin = all.rows.len();
         for session in &file.sessions {
-            let ways = directions(
-                session,
-                prior.nominal.ratio,
-                recorded.step_rad,
-                SETTLED * play_rad * prior.nominal.ratio.abs(),
-            );
+            let settle_rad = SETTLED * play_rad * prior.nominal.ratio.abs();
+            let mut ways = directions(session, prior.nominal.ratio, recorded.step_rad, settle_rad);
+            held_by_load(&mut ways, session, recorded.scales.friction_n_m, settle_rad);
             let speeds = speeds_rad_s(session, prior.nominal.ratio);
             let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
             for k in thinned {
@@ -396,6 +393,20 @@ fn directions(session: &Session, ratio: f64, step_rad: f64, settle_rad: f64) -> 
         (way != 0.0 && (psi - turned_at).abs() >= settle_rad).then_some(way * ratio.signum())
     };
     session.generator_rad.iter().zip(turns).map(settled).collect()
+}
+
+/// Takes the direction off rows at no load that still lie on the flank where a load left them: until the play is
+/// through.
+fn held_by_load(ways: &mut [Option<f64>], session: &Session, friction_n_m: f64, settle_rad: f64) {
+    let mut left_at = f64::NAN;
+    let loads = session.generator_rad.iter().zip(session.torque_n_m.iter().flatten());
+    for (way, (psi, torque)) in ways.iter_mut().zip(loads) {
+        if torque.abs() > friction_n_m {
+            left_at = *psi;
+        } else if (psi - left_at).abs() < settle_rad {
+            *way = None;
+        }
+    }
 }
 
 #[cfg(test)]

@@ -230,6 +230,37 @@ fn another_pace_back_is_no_second_pace_and_play_is_found() {
     assert!((unloaded.value_arcsec.unwrap() + 20.0).abs() < 0.5, "{unloaded:?}");
 }
 
+/// A bench that sets the output to zero anew before each session of a log, and not: zeros of their own, and one.
+#[test]
+fn sessions_that_were_set_to_zero_anew_have_zeros_of_their_own() {
+    let law = |psi: f64, _: f64, torque: f64, way: f64| 20.0 * (2.0 * psi).sin() + 1.5 * torque - 12.0 * way;
+    for zeros in [[0.0, 80.0, -60.0, 130.0], [0.0; 4]] {
+        let mut log = recording(1, law);
+        let session = |(seed, zero): (u64, f64)| {
+            let mut session = recording(seed, law).sessions.remove(0);
+            session.error_rad.iter_mut().for_each(|error| *error += zero / ARCSEC_PER_RAD);
+            session
+        };
+        log.sessions = (1..).zip(zeros).map(session).collect();
+        let made = calibrate(std::slice::from_ref(&log), &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+        let c = &made.calibration;
+        let found = c.readings.iter().filter(|reading| reading.name == OFFSET).map(|reading| reading.value);
+        let found: Vec<f64> = found.collect();
+        let (anew, first) = (zeros[1] != 0.0, found[0]);
+        assert_eq!((found.len(), c.files.len()), (if anew { 4 } else { 1 }, 1), "{:?}", c.notes);
+        assert!(found.iter().zip(zeros).all(|(found, zero)| (found - first - zero).abs() < 0.5), "{found:?}");
+        assert_eq!(c.notes.iter().any(|note| note == SET_ANEW), anew, "{:?}", c.notes);
+        let torque = c.torque_from_wind_up.as_ref().unwrap();
+        assert!(c.held_out.rms_after_arcsec < 2.5 && torque.rms_n_m < 1.6, "{:?} {torque:?}", c.held_out);
+        let table = Table::check(&made.table.image).unwrap();
+        let on_one = on_zero_of(&table, log);
+        let means = on_one.sessions.iter().map(|session| session.error_rad.iter().sum::<f64>() / session.len() as f64);
+        let means: Vec<f64> = means.map(|mean| mean * ARCSEC_PER_RAD).collect();
+        assert!(means.iter().all(|mean| (mean - means[0]).abs() < 5.0), "{means:?}");
+        assert_eq!(on_one.notes.iter().any(|note| note == SET_ANEW), anew, "{:?}", on_one.notes);
+    }
+}
+
 /// Logs at one load each, and each with a zero that is free, say nothing of the wind-up.
 #[test]
 fn logs_of_one_load_each_make_no_wind_up() {

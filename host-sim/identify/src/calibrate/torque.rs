@@ -13,8 +13,9 @@ use super::prior::Prior;
 use super::rows::{FoldKind, Rows};
 use super::{LEAST_GAIN, Model, ROUNDING_ARCSEC};
 use crate::linear::{self, Gram, solve};
-use crate::measurement::quantile_of;
-use crate::wind_up::{HeldTorques, Hysteresis, load_of};
+use crate::measurement::{Recording, quantile_of};
+use crate::replay::measured_rows;
+use crate::wind_up::{HeldTorques, Hysteresis, along, load_of};
 use flexspline_base::robust::rms;
 use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -39,7 +40,8 @@ pub struct WindUpTorque {
     pub inside: f64,
     /// Rows.
     pub rows: usize,
-    /// Half width of the error that the intervals are of, arcsec: where 95 of 100 rows of the other folds lie.
+    /// Half width of the error that the intervals are of, arcsec: where 95 of 100 rows of the other folds lie, and of
+    /// all rows.
     pub half_width_arcsec: f64,
     /// Hysteresis that the torques are read with, if they are better with one: no table holds it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -144,6 +146,17 @@ impl WindUpTorque {
         let holds_arcsec = |of: &SlipSpring| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD;
         hysteresis.springs.retain(|spring| holds_arcsec(spring) > ROUNDING_ARCSEC);
         Some(Self { hysteresis: Some(hysteresis), ..with })
+    }
+
+    /// With intervals wide enough for all rows as they are read by a table: those inside the play, and after a reversal of
+    /// the load, among them.
+    pub(super) fn over_all(self, files: &[Recording], table: &Table<'_>, temperature_c: f64) -> Self {
+        let rows: Vec<_> = measured_rows(files.iter().flat_map(|file| &file.sessions), temperature_c).collect();
+        let hysteresis = self.hysteresis.clone().unwrap_or_default();
+        let needs = along(table, &rows, &hysteresis, |curve, row, error_rad| curve.needs(row, error_rad)[1]);
+        let mut needs: Vec<f64> = needs.into_iter().filter(|needs| needs.is_finite()).collect();
+        let of_all_arcsec = quantile_of(&mut needs, INSIDE) * ARCSEC_PER_RAD;
+        Self { half_width_arcsec: self.half_width_arcsec.max(of_all_arcsec), ..self }
     }
 
     /// Of fits, each without the fold of its place, in the order of the rows: springs go by the torques found.

@@ -189,6 +189,13 @@ fn vertex([before, at, after]: [f64; 3]) -> f64 {
     if curve > 0.0 { (0.5 * (before - after) / curve).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
+/// Residual of the prior with a zero for each log, and with what load and direction may add, arcsec rms.
+pub(super) fn left_beside_load(rows: &Rows, friction_n_m: f64) -> f64 {
+    let some = thinned(rows.rows.iter(), FOUND_WITH);
+    let prior = |_: f64| some.iter().map(|row| row.measured_arcsec - row.left_arcsec).collect::<Vec<f64>>();
+    (PhaseSearch::new(&prior, &some, friction_n_m).squares(0.0) / some.len().max(1) as f64).sqrt()
+}
+
 /// Finds the phase of a table against logs.
 pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignment {
     let [looked_at, found_with] = [LOOKED_AT, FOUND_WITH].map(|most| thinned(rows.rows.iter(), most));

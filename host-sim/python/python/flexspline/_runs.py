@@ -344,6 +344,7 @@ def calibrate(
     columns: str | Mapping[str, str] = "",
     rate_hz: float | None = None,
     torque_constant: float | None = None,
+    split: bool = False,
     threads: int | None = None,
     progress: Progress = None,
 ) -> Calibration:
@@ -353,6 +354,7 @@ def calibrate(
     ``ratio`` (negative where generator and output turn opposite ways), ``model`` (the path of a nominal.toml) and ``table``.
     Columns are ``time_s, generator_rad, output_rad`` or ``error_arcsec, torque_n_m, temperature_c`` unless ``columns`` maps them, as
     ``{"generator": "wave_gen_turns:turn"}``; ``rate_hz`` where there is no time; ``torque_constant`` N·m for an ampere.
+    With ``split`` its `split` says what the encoders and the gear have of the error.
     Raises `BadInput`, or `NothingGained` where no table is better than none.
 
     >>> calibrate("bench.csv", ratio=101).save("unit7")  # doctest: +SKIP
@@ -363,6 +365,7 @@ def calibrate(
             _known(ratio, model, table),
             generator,
             (columns_option(columns), rate_hz, torque_constant),
+            split,
             threads=threads,
             progress=tell,
         )
@@ -376,7 +379,7 @@ def calibrate(
     return made
 
 
-_OPTIONS = ("ratio", "model", "table", "generator", "columns", "rate_hz", "torque_constant", "threads", "progress")
+_OPTIONS = ("ratio", "model", "table", "generator", "columns", "rate_hz", "torque_constant", "split", "threads", "progress")
 """What `calibrate` takes beside the logs."""
 
 

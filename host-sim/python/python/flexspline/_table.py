@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,6 +20,8 @@ from ._inputs import PathLike, log, numbers, output, signs, spread, table_column
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from ._runs import Calibration
 
 ARCSEC_PER_RAD: float = _native.Table.arcsec_per_rad
 """Arc-seconds in a radian, as every number here is converted."""
@@ -373,19 +376,24 @@ class Table:
         half_width_arcsec: ArrayLike = 0.0,
         direction: ArrayLike | None = None,
         state: PlayState | None = None,
+        calibration: Calibration | None = None,
     ) -> WindUp:
         """Which torque winds the drive up from ``generator_rad`` to ``output_rad``, both on the zeros of the table.
 
         With ``direction`` each row for itself, in steady motion that way; else in their order, from ``state`` or anywhere in the play.
-        ``half_width_arcsec`` is that of the readings and of the table: ``torque_from_wind_up.half_width_arcsec`` of a calibration.
+        ``half_width_arcsec`` is that of the readings and of the table. A ``calibration`` gives it, and the hysteresis, which no table holds:
+        torques as the command ``replay`` finds them.
         """
+        found = {} if calibration is None else calibration.json.get("torque_from_wind_up", {})
+        half_width_arcsec = found.get("half_width_arcsec", half_width_arcsec)
+        hysteresis = json.dumps(found["hysteresis"]) if "hysteresis" in found and direction is None else None
         reading = numbers("output_rad", output_rad)
         generator, half_width = spread(numbers("generator_rad", generator_rad), reading.size), numbers("half_width_arcsec", half_width_arcsec)
         temperature = numbers("temperature_c", temperature_c)
         said = WindUp({name: np.empty(generator.size) for name in ("torque_n_m", "low_n_m", "high_n_m")})
         play = None if state is None else state._inner
         sides = self._sides(direction, state)
-        self._inner.torque(generator, reading, temperature, half_width / ARCSEC_PER_RAD, sides, play, *said.columns.values())
+        self._inner.torque(generator, reading, temperature, half_width / ARCSEC_PER_RAD, sides, play, hysteresis, *said.columns.values())
         return said
 
     def replay(
