@@ -51,7 +51,8 @@ pub struct Chain {
     /// First unknown of each block in a right-hand side.
     offsets: Vec<usize>,
     unknowns: usize,
-    /// Work space: matrices that have been used up.
+    /// Work space: the front, and matrices that have been used up.
+    front: Vec<f64>,
     spare: Vec<Vec<f64>>,
 }
 
@@ -97,35 +98,29 @@ impl Chain {
                 offset[*b as usize] = m;
                 m += blocks[*b as usize].size;
             }
-            // The front is made at the end of the values: its first columns are the panel, and stay.
-            let start = self.values.len();
-            self.values.resize(start + m * m, 0.0);
-            let front = &mut self.values[start..];
+            self.front.clear();
+            self.front.resize(m * m, 0.0);
             for source in sources {
-                add_block_matrix(front, m, source, blocks, &offset);
+                add_block_matrix(&mut self.front, m, source, blocks, &offset);
             }
             let ChainBlock { size, sign, .. } = blocks[block as usize];
-            if !self.kernels.eliminate(front, m, size, sign) {
+            if !self.kernels.eliminate(&mut self.front, m, size, sign) {
                 return false;
             }
+            let start = self.values.len();
+            self.values.extend_from_slice(&self.front[..m * size]);
             let later = members.split_off(1);
             for u in std::mem::take(&mut updates_at[block as usize]) {
                 self.spare.push(std::mem::take(&mut updates[u as usize].matrix));
             }
             if let Some(&next) = later.first() {
-                // Only the lower triangle: above it stands what was there.
                 let mut matrix = self.spare.pop().unwrap_or_default();
-                let n = m - size;
-                matrix.resize(n * n, 0.0);
-                for (k, (to, from)) in
-                    matrix.chunks_exact_mut(n.max(1)).zip(front.chunks_exact(m).skip(size)).enumerate()
-                {
-                    to[k..].copy_from_slice(&from[size + k..]);
-                }
+                matrix.clear();
+                let left = self.front.chunks_exact(m).skip(size);
+                left.for_each(|column| matrix.extend_from_slice(&column[size..]));
                 updates_at[next as usize].push(updates.len() as u32);
                 updates.push(Contribution { blocks: later.clone(), matrix });
             }
-            self.values.truncate(start + m * size);
             self.panels.push(Panel { block, size, sign, order: m, later, start });
         }
         true

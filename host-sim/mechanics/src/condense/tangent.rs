@@ -116,20 +116,15 @@ impl CellAt<'_> {
 }
 
 impl CellTangent {
-    /// That of a cell on which nothing bears and that does not turn: its own stiffness says it all.
-    pub fn bare(place: CellPlacement) -> CellTangent {
-        CellTangent { place, ..CellTangent::default() }
-    }
-
     /// Reduces a cell to its contribution; false where it is not stiff. `contact` adds what touches the bore to the
-    /// lower triangle of the matrix of bore and faces (of the given order), of which it makes a copy where it does.
+    /// lower triangle of the matrix of bore and faces (of the given order) and says whether it did.
     pub fn reduce(
         &mut self,
         kernels: DenseKernels,
         cell: &Cell,
         (place, tractions): (CellPlacement, Vec<Traction>),
         geometric: Option<Geometric>,
-        contact: impl FnOnce(&mut Vec<f64>, usize),
+        contact: impl FnOnce(&mut [f64], usize) -> bool,
         Contribution { blocks, matrix }: &mut Contribution,
     ) -> bool {
         let (f, b, i) = (cell.flank(), cell.bore(), 2 * cell.face());
@@ -138,9 +133,8 @@ impl CellTangent {
         self.tractions = tractions;
 
         // Bore and faces.
-        self.panel.clear();
-        contact(&mut self.panel, r);
-        let touched = !self.panel.is_empty();
+        self.panel.clone_from(&cell.body);
+        let touched = contact(&mut self.panel, r);
         if touched && !kernels.eliminate(&mut self.panel, r, b, 1.0) {
             return false;
         }

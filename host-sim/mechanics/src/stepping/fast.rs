@@ -193,11 +193,8 @@ pub(super) struct CondensedWheels<'p> {
     bore: Vec<(usize, [f64; 21])>,
     flanks: Vec<(FlankPair, Vec<f64>)>,
     factor: Kept,
-    /// Work space of a factorisation, and circular-spline cells whose contribution there is without contact.
+    /// Work space of a factorisation.
     contributions: Vec<Contribution>,
-    bare: Vec<bool>,
-    /// A factorisation that nobody needs any more.
-    spare: Option<Factorisation>,
     /// Pitches by which the state is turned against the one that the factor was made for.
     turned: isize,
 }
@@ -220,8 +217,6 @@ impl<'p> CondensedWheels<'p> {
             flanks: Vec::new(),
             factor: Rc::default(),
             contributions: Vec::new(),
-            bare: vec![false; cells - teeth],
-            spare: None,
             turned: 0,
         }
     }
@@ -275,12 +270,12 @@ impl<'p> CondensedWheels<'p> {
             blocks: [j as u32, ((j + 1) % mesh.teeth) as u32],
         };
         let geometric = Geometric { a: &state.turn_rate, g: &g, c };
-        let contact = |matrix: &mut Vec<f64>, order: usize| self.add_bore_contact(j, &cell.body, matrix, order);
+        let contact = |matrix: &mut [f64], order: usize| self.add_bore_contact(j, matrix, order);
         tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), contact, contribution)
     }
 
-    /// Where there is contact on the bore of a cell, the matrix of its bore and face nodes with it.
-    fn add_bore_contact(&self, j: usize, body: &[f64], matrix: &mut Vec<f64>, order: usize) {
+    /// Adds the contact on the bore of a cell to the matrix of its bore and face nodes; whether there is any.
+    fn add_bore_contact(&self, j: usize, matrix: &mut [f64], order: usize) -> bool {
         let mesh = self.model.fs_mesh();
         let (cell, _) = self.model.flexspline.cell(j, false);
         let (b, face) = (cell.bore(), cell.face());
@@ -288,10 +283,9 @@ impl<'p> CondensedWheels<'p> {
         let (sin, cos) = (mesh.sector_angle(j) + self.states[j].turn).sin_cos();
         let first = self.bore.partition_point(|(edge, _)| *edge < j * per_cell);
         let touching = self.bore[first..].iter().take_while(|(edge, _)| *edge < (j + 1) * per_cell);
+        let mut any = false;
         for (edge, k) in touching {
-            if matrix.is_empty() {
-                matrix.extend_from_slice(body);
-            }
+            any = true;
             // Nodes along the bore of the cell: corner of the first face, bore nodes, corner of the second face.
             let place = |n: usize| match n {
                 0 => b,
@@ -321,30 +315,24 @@ impl<'p> CondensedWheels<'p> {
                 }
             }
         }
+        any
     }
 
-    /// Reduces a circular-spline cell; where nothing bears on it, now and when its contribution was made, that stays
-    /// as it was.
     fn reduce_circular_spline_cell(
         &self,
         t: usize,
         tangent: &mut CellTangent,
         tractions: Vec<Traction>,
         contribution: &mut Contribution,
-        as_before: bool,
     ) -> bool {
         let (first, mesh) = (self.model.fs_mesh().teeth, self.model.cs_mesh());
         let place = CellPlacement {
-            frame: self.model.frames[1][t],
+            frame: cs_frame(mesh, t).sin_cos(),
             faces: [0.5, -0.5].map(|half| (half * mesh.pitch()).sin_cos()),
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
         };
-        if as_before {
-            *tangent = CellTangent::bare(place);
-            return true;
-        }
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
-        tangent.reduce(self.kernels, cell, (place, tractions), None, |_, _| {}, contribution)
+        tangent.reduce(self.kernels, cell, (place, tractions), None, |_, _| false, contribution)
     }
 
     /// Places the flank nodes of these cells where they stand while no force acts on them.
@@ -565,27 +553,21 @@ impl Wheels for CondensedWheels<'_> {
 
     fn factorise(&mut self, spring: f64) -> bool {
         let (mut tractions, ranks) = self.tractions();
-        let last = Rc::try_unwrap(std::mem::take(&mut self.factor)).ok();
-        let mut factor = last.or_else(|| self.spare.take()).unwrap_or_default();
+        let mut factor = Rc::try_unwrap(std::mem::take(&mut self.factor)).unwrap_or_default();
         factor.cells.resize_with(self.live.len(), CellTangent::default);
         let fs_cells = self.model.flexspline.count();
         factor.live.clone_from(&self.live);
         let mut contributions = std::mem::take(&mut self.contributions);
         contributions.resize_with(factor.cells.len(), Contribution::default);
-        let mut bare = std::mem::take(&mut self.bare);
         let mut cells = factor.cells.iter_mut().zip(&mut contributions).enumerate();
         let mut definite = cells.all(|(c, (tangent, contribution))| {
             let tractions = std::mem::take(&mut tractions[c]);
             if c < fs_cells {
                 self.reduce_flexspline_cell(c, tangent, tractions, contribution)
             } else {
-                let bears_nothing = !self.live[c] && tractions.is_empty();
-                let was_bare = std::mem::replace(&mut bare[c - fs_cells], bears_nothing);
-                let as_before = bears_nothing && was_bare;
-                self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions, contribution, as_before)
+                self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions, contribution)
             }
         });
-        self.bare = bare;
         if definite {
             let blocks = self.blocks(&ranks);
             // Springs, the anchor (tangential is y in the frame of a face), and the unit of the tractions.
@@ -611,10 +593,6 @@ impl Wheels for CondensedWheels<'_> {
 
     fn keep(&self) -> Option<Kept> {
         Some(self.factor.clone())
-    }
-
-    fn give_back(&mut self, kept: Kept) {
-        self.spare = Rc::try_unwrap(kept).ok().or(self.spare.take());
     }
 
     fn recall(&mut self, kept: &Kept, pitches: isize) {

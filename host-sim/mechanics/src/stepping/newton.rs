@@ -696,10 +696,8 @@ impl<'p> Solver<'p> {
             return;
         }
         if let (0, Some(kept), Some(eliminated)) = (self.turned, self.wheels.keep(), &self.eliminated) {
-            if self.tangents.len() == TANGENTS
-                && let Some(oldest) = self.tangents.pop_front()
-            {
-                self.wheels.give_back(oldest.kept);
+            if self.tangents.len() == TANGENTS {
+                self.tangents.pop_front();
             }
             self.tangents.push_back(Tangent { generator_rad, kept, eliminated: eliminated.clone() });
         }

@@ -47,9 +47,6 @@ pub(super) trait Wheels: Factor {
         None
     }
 
-    /// Takes back a kept factor that will not be used again, for the memory that it has.
-    fn give_back(&mut self, _kept: Kept) {}
-
     /// Uses a kept factor in a state that is turned by a number of flexspline pitches against its own: it solves in the
     /// numbering of its own state.
     fn recall(&mut self, _kept: &Kept, _pitches: isize) {}
