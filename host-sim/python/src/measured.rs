@@ -85,9 +85,9 @@ pub enum KnownFrom {
     Model(PathBuf),
 }
 
-/// Rows of a drive with hidden effects, each `NAME:param=value,…`, as `flexspline synthesize` makes them with this seed:
-/// a CSV, and the text of the effects with all values. `motion` is sessions, rows in each, largest speed (rad/s) and
-/// torque (N·m), `noise_arcsec` white noise and wander.
+/// Rows of a drive with hidden effects, each `NAME:param=value,…`, as `flexspline synthesize` makes them with this
+/// seed: a CSV, and the text of the effects with all values. `motion` is sessions, rows in each, largest speed (rad/s)
+/// and torque (N·m), `noise_arcsec` white noise and wander.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "each is an option of the run")]
 pub fn synthesize(

@@ -182,8 +182,8 @@ pub fn stress_by_place(
 /// fine had up to 1.3 times that of the coarse one, and down to a third.
 const NEAR_YIELD: f64 = 0.7;
 
-/// The largest stress in the root fillets, MPa, as the mesh of a run has it and as it is judged: near the limit of steel
-/// by a finer mesh, the drive at rest in the same place, where that finds equilibrium.
+/// The largest stress in the root fillets, MPa, as the mesh of a run has it and as it is judged: near the limit of
+/// steel by a finer mesh, the drive at rest in the same place, where that finds equilibrium.
 pub(crate) fn judged_fillet_mpa(
     drive: &Drive,
     kind: GeneratorKind,

@@ -148,8 +148,8 @@ impl WindUpTorque {
         Some(Self { hysteresis: Some(hysteresis), ..with })
     }
 
-    /// With intervals wide enough for all rows as they are read by a table: those inside the play, and after a reversal of
-    /// the load, among them.
+    /// With intervals wide enough for all rows as they are read by a table: those inside the play, and after a reversal
+    /// of the load, among them.
     pub(super) fn over_all(self, files: &[Recording], table: &Table<'_>, temperature_c: f64) -> Self {
         let rows: Vec<_> = measured_rows(files.iter().flat_map(|file| &file.sessions), temperature_c).collect();
         let hysteresis = self.hysteresis.clone().unwrap_or_default();

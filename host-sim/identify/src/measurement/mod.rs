@@ -3,9 +3,9 @@
 //! Angles are radians, torque N·m, temperature °C, time s; `error` is output less generator over ratio, rad at the
 //! output. All columns of a session have the same length; what was not recorded is `None`.
 //!
-//! [`parse`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps in
-//! time as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before anything
-//! is asked of the drive.
+//! [`parse`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps
+//! in time as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before
+//! anything is asked of the drive.
 
 mod averages;
 mod columns;
