@@ -165,7 +165,7 @@ fn libraries_are_taken_from_a_folder_and_those_that_lack_are_named() {
     let missing = all["missing"].as_array().unwrap();
     assert_eq!(missing.len(), 7);
     assert!(
-        missing.iter().all(|missing| missing["why"].as_str().unwrap().contains("--libraries names another folder")),
+        missing.iter().all(|missing| missing["why"].as_str().unwrap().contains("libflexspline.a in libraries")),
         "{missing:?}"
     );
     assert_eq!(desk.read("made/lib/thumbv7m-none-eabi/libflexspline.a"), archive);
