@@ -154,7 +154,7 @@ def test_missing_values_and_times_are_taken_as_they_are(log_file: Path, tmp_path
 
 
 def test_synthesize_is_the_command(tmp_path: Path) -> None:
-    effect = "gravity_torque:amplitude_n_m=3"
+    effect = "gravity_torque:torque_n_m=3"
     command("synthesize", "--model", MODEL, "--effect", effect, "--seed", 5, "--rows", 400, "--out", tmp_path)
     made = flexspline.synthesize(effect, model=MODEL, seed=5, rows=400)
     theirs = read_csv(tmp_path / "data.csv")

@@ -262,7 +262,7 @@ def synthesize(
 ) -> Synthesized:
     """Measurements of a drive with effects of your choice, to try `diagnose` on: ``flexspline synthesize``, with its defaults.
 
-    ``effects`` as the command takes them (``gravity_torque:amplitude_n_m=3``; ``flexspline synthesize --list`` has all). The drive is a
+    ``effects`` as the command takes them (``gravity_torque:torque_n_m=3``; ``flexspline synthesize --list`` has all). The drive is a
     ``model`` (a nominal.toml) or a ``table`` of ``drive``; with ``spread`` its unit is drawn. The same ``seed`` gives the same rows.
 
     >>> synthesize("flexspline_runout", model="nominal.toml", seed=1).rows  # doctest: +SKIP
