@@ -33,6 +33,7 @@ table! {
         Gain = ("gain", Kind::Other),
         GeneratorAmplitudeArcsec = ("generator_amplitude_arcsec", Kind::Other),
         GrowthArcsec = ("growth_arcsec", Kind::Size),
+        HalfLashArcsec = ("half_lash_arcsec", Kind::Other),
         HalfLoadNM = ("half_load_n_m", Kind::Other),
         HalfWidthArcsec = ("half_width_arcsec", Kind::Size),
         HardeningArcsec = ("hardening_arcsec", Kind::Size),

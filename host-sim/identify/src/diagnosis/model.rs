@@ -373,6 +373,9 @@ const STEP: f64 = 0.01;
 /// Prior standard deviation of a normalised shape parameter about where it is. *Guess*: about that of an even
 /// distribution over the range, 1/√12.
 const PLACE_SPREAD: f64 = 0.3;
+/// Above this share of the load scale the torque leaves no doubt about the flank. *Guess*: friction is a few per cent
+/// of the load.
+const LOADED: f64 = 0.3;
 /// Directions in which a second displacement is tried. *Guess*: refinement reaches half a step to either side.
 const DIRECTIONS: usize = 8;
 /// Sizes at which it is tried: how far its normalised parameter is below the other's. *Guess*: hardly smaller, and
@@ -380,6 +383,11 @@ const DIRECTIONS: usize = 8;
 const SMALLER: [f64; 2] = [0.05, 0.2];
 /// Sizes at which one is tried under an eccentric generator, arcsec. *Guess*: a small and a usual one.
 const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
+/// All steps together gain no more than this multiple of what the linear model of the first one promises, … *Guess*:
+/// models bend, but rarely as much as that.
+const FARTHER_THAN_LINEAR: f64 = 3.0;
+/// … and this much evidence. *Guess*: above the 6 from which a cause may be named.
+const BEYOND_LINEAR: f64 = 10.0;
 /// A step that promises less evidence than this is not tried. *Guess*: far below what decides anything.
 const LEAST_PROMISED: f64 = 0.1;
 /// A step that gains less evidence than this is the last one. *Guess*: far below what decides anything.
@@ -586,7 +594,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let met = self.terms.iter().find(|t| t.law.meets(law)).map(|t| (t, SMALLER));
         // Under an eccentric generator it shows as another order than alone: no lead points there. Both are pressed in
         // alike.
-        let under = |t: &&&Term<'_>| t.law.acts.zones.is_some() && t.law.acts_on(law) && !t.law.meets(law);
+        let under = |t: &&&Term<'_>| t.law.is_in_zones() && t.law.acts_on(law) && !t.law.meets(law);
         let lobes =
             self.terms.iter().find(under).map(|t| (t, BESIDE_ARCSEC.map(|arcsec| law.shapes[size].place(arcsec))));
         for (is_met, (other, sizes)) in [(true, met), (false, lobes)].into_iter().filter_map(|(a, b)| Some((a, b?))) {
@@ -606,6 +614,23 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             return tried;
         }
         let problem = self.problem;
+        let least = LOADED * problem.on.scales.load;
+        let mask: Vec<bool> = problem
+            .whitener
+            .average(&problem.on.rows.torque)
+            .iter()
+            // A load decides which flank carries: its lead holds where the recorded one leaves no doubt about that.
+            .map(|torque| !law.is_load() || torque.abs() > least)
+            .collect();
+        let some = mask.iter().filter(|m| **m).count() > mask.len() / 10;
+        let masked = |set: &Set| {
+            let of = |column: &Vec<f64>| -> Vec<f64> {
+                column.iter().zip(&mask).map(|(v, m)| if *m || !some { *v } else { 0.0 }).collect()
+            };
+            Set::new(set.iter().map(of).collect())
+        };
+        let known: Vec<Set> = problem.sets(&self.terms, None).into_iter().map(masked).collect();
+        let products = Products::over(std::iter::once(0..mask.len()).collect());
         let mut priors = problem.base_priors();
         priors.extend(self.terms.iter().flat_map(|t| t.white.priors(None)));
         tried
@@ -614,8 +639,10 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let lead_columns = self.white(law, Extent::Lead, &places);
                 let mut all = priors.clone();
                 all.extend(lead_columns.priors(None));
-                let gram = problem.products.gram(&problem.sets(&self.terms, [&lead_columns.columns]), None);
-                let solution = solve(&gram, &all, problem.fineness.worth);
+                let new = masked(&lead_columns.columns);
+                let mut sets: Vec<&Set> = known.iter().collect();
+                sets.insert(known.len() - 1, &new);
+                let solution = solve(&products.gram(&sets, None), &all, problem.fineness.worth);
                 let found = solution.map(|s| {
                     law.beginnings(&law.values(&places), lead_columns.by_role(&s.coefficients[priors.len()..]))
                 });
@@ -648,18 +675,28 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// Moves the shape parameters of `term` to where the misfit is least, beside the terms of the scaffold.
     #[must_use]
-    pub(crate) fn refine<'n>(&self, mut term: Term<'n>) -> Option<(Term<'n>, Fit)> {
+    pub(crate) fn refine<'n>(&self, term: Term<'n>) -> Option<(Term<'n>, Fit)> {
+        self.refine_towards(term, f64::NEG_INFINITY)
+    }
+
+    /// As [`Scaffold::refine`], but nothing where the first step shows that this evidence is out of reach.
+    #[must_use]
+    pub(crate) fn refine_towards<'n>(&self, mut term: Term<'n>, least_evidence: f64) -> Option<(Term<'n>, Fit)> {
         let mut fit = self.fit(Some(&term))?;
         if term.places.is_empty() {
             return Some((term, fit));
         }
-        for _ in 0..STEPS {
+        for step in 0..STEPS {
             let coefficients = fit.of(fit.starts.len() - 1).to_vec();
             let free = self.fit_with(Some(&term.white), Some(&Set::new(self.derivatives(&term, &coefficients))))?;
             let moves = &free.solution.coefficients[fit.priors.len()..];
             let now = fit.solution.evidence;
             let promised = 0.5 * (fit.solution.misfit - free.solution.misfit);
             term.occam = (free.solution.evidence - now - promised).min(0.0) - term.law.search.odds_against;
+            let in_reach = now + FARTHER_THAN_LINEAR * (free.solution.evidence - now).max(0.0) + BEYOND_LINEAR;
+            if step == 0 && in_reach < least_evidence {
+                return None;
+            }
             // The linear model of a step says what it can gain.
             if promised < LEAST_PROMISED {
                 break;

@@ -331,9 +331,16 @@ impl FreeColumns {
 
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by
 /// its evidence with the main columns of all laws as free columns. Returns also the worth of the information: below 1
-/// where innovations are not white. `explained` is what is explained already, row by row.
+/// where innovations are not white. `explained` is what is explained already, row by row; `near` is what was found
+/// before.
 #[must_use]
-pub fn noise(on: &Excitation<'_>, columns: &FreeColumns, explained: &[f64], uncertain: &[bool]) -> (Noise, f64) {
+pub fn noise(
+    on: &Excitation<'_>,
+    columns: &FreeColumns,
+    explained: &[f64],
+    uncertain: &[bool],
+    near: Option<Noise>,
+) -> (Noise, f64) {
     let rows = on.rows;
     let left = on.left(explained);
     let white = white_level(rows, &left);
@@ -349,21 +356,50 @@ pub fn noise(on: &Excitation<'_>, columns: &FreeColumns, explained: &[f64], unce
         Some(judged) => thrown_out(&judged, uncertain),
         None => uncertain.to_vec(),
     };
-    let judge = |noise: &Noise| judge_under(Whitener::new(rows, &uncertain, stride, *noise));
-    let judged: Vec<Option<Hypothesis>> = hypotheses.par_iter().map(judge).collect();
-    let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |judged| judged.evidence);
-    let likeliest = (0..judged.len()).map(evidence).fold(f64::NEG_INFINITY, f64::max);
-    // A short recording does not tell a wander from none: then what it could hide is no cause.
-    let power = |k: &usize| hypotheses[*k].wander * hypotheses[*k].correlation_s.sqrt();
-    let as_likely = (0..judged.len()).filter(|k| evidence(*k) >= likeliest - AS_LIKELY);
-    let best = as_likely.max_by(|a, b| power(a).total_cmp(&power(b))).unwrap_or(0);
+    let mut judged: Vec<Option<Hypothesis>> = hypotheses.iter().map(|_| None).collect();
+    // Some cannot be judged: each is asked once.
+    let mut asked = vec![false; hypotheses.len()];
+    let mut best = 0;
+    let mut next = match near {
+        Some(near) => beside(nearest(&hypotheses, near)),
+        None => FIRST.to_vec(),
+    };
+    // From a few up the evidence, until all beside the best have been judged.
+    while !next.is_empty() {
+        let judge = |k: &usize| (*k, judge_under(Whitener::new(rows, &uncertain, stride, hypotheses[*k])));
+        for (k, of) in next.par_iter().map(judge).collect::<Vec<_>>() {
+            judged[k] = of;
+            asked[k] = true;
+        }
+        let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |judged| judged.evidence);
+        let likeliest = (0..judged.len()).max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(0);
+        // A short recording does not tell a wander from none: then what it could hide is no cause.
+        let power = |k: &usize| hypotheses[*k].wander * hypotheses[*k].correlation_s.sqrt();
+        best = (0..judged.len())
+            .filter(|k| evidence(*k) >= evidence(likeliest) - AS_LIKELY)
+            .max_by(|a, b| power(a).total_cmp(&power(b)))
+            .unwrap_or(0);
+        next = [beside(likeliest), beside(best)].concat();
+        next.sort_unstable();
+        next.dedup();
+        next.retain(|k| !asked[*k]);
+    }
+    // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks
+    // over, which a wander that follows everything would hide.
+    let restless = on.unloaded()
+        && hypotheses[best].wander >= MOST_WANDER * white
+        && hypotheses[best].correlation_s <= FASTEST_S * unit;
+    if restless {
+        best = hypotheses.len() - 1;
+        judged[best] = judge_under(Whitener::new(rows, &uncertain, stride, hypotheses[best]));
+    }
     let worth = judged[best].as_ref().map_or(1.0, |judged| worth_of(&judged.innovations, &judged.whitener));
     (hypotheses[best], worth)
 }
 
-/// Standard deviations of the drift that are tried, in units of the white noise. *Guess*: at least twice as much from
-/// one to the next.
-const WANDERS: [f64; 4] = [0.2, 0.45, 1.0, MOST_WANDER];
+/// Standard deviations of the drift that are tried, in units of the white noise. *Guess*: mostly half as much again
+/// from one to the next.
+const WANDERS: [f64; 8] = [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER];
 /// Correlation times of the drift that are tried, s. *Guess*: two to a decade, from the fastest to minutes.
 const CORRELATIONS_S: [f64; 4] = [FASTEST_S, 8.0, 25.0, 80.0];
 
@@ -373,6 +409,33 @@ fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
         |wander: f64, correlation: f64| Noise { white, wander: wander * white, correlation_s: correlation * unit };
     let all = WANDERS.iter().flat_map(|wander| CORRELATIONS_S.map(|correlation| with(*wander, correlation)));
     [Noise { white, wander: 0.0, correlation_s: 1.0 }].into_iter().chain(all).collect()
+}
+
+/// Hypotheses that are judged first: none, and the fastest and a slow one of three drifts. *Guess*: the best is reached
+/// from any of them.
+const FIRST: [usize; 7] = [0, 5, 7, 17, 19, 29, 31];
+
+/// A hypothesis and those beside it.
+fn beside(hypothesis: usize) -> Vec<usize> {
+    let width = CORRELATIONS_S.len();
+    let Some(at) = hypothesis.checked_sub(1) else { return (0..=width).collect() };
+    let (row, column) = (at / width, at % width);
+    let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+    let grid =
+        around(row, WANDERS.len()).flat_map(|row| around(column, width).map(move |column| 1 + row * width + column));
+    if row == 0 { [0].into_iter().chain(grid).collect() } else { grid.collect() }
+}
+
+/// The hypothesis that is most like this one.
+fn nearest(hypotheses: &[Noise], noise: Noise) -> usize {
+    if noise.wander == 0.0 {
+        return 0;
+    }
+    let apart = |other: &Noise| {
+        let of = |a: f64, b: f64| (a / b).ln().abs();
+        of(other.wander / other.white, noise.wander / noise.white) + of(other.correlation_s, noise.correlation_s)
+    };
+    (1..hypotheses.len()).min_by(|a, b| apart(&hypotheses[*a]).total_cmp(&apart(&hypotheses[*b]))).unwrap_or(0)
 }
 
 /// How well a hypothesis of the noise tells what is left.

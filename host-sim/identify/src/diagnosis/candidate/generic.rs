@@ -4,7 +4,10 @@
 use std::f64::consts::TAU;
 
 use super::geometry::{Angle, waves};
-use super::{Excitation, Label, Law, Per, Tag, by_row, main, times};
+use super::stiffness::follow;
+use super::{Excitation, Label, Law, Per, Shape, Tag, by_row, main, times};
+use crate::causes::ParameterName as Name;
+use flexspline_base::units::ARCSEC_PER_RAD;
 
 fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
     Law::new(name, move |on, _| vec![main(of_unit_size(by_row(on, |k| values(on, k))), 20.0)])
@@ -14,6 +17,21 @@ fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send
 fn of_unit_size(column: Vec<f64>) -> Vec<f64> {
     let size = super::super::rows::rms(&column).max(1e-12);
     column.into_iter().map(|v| v / size).collect()
+}
+
+/// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either
+/// way.
+fn lash_before_the_generator() -> Law {
+    Law::new("lost motion before the generator", |on, shape| {
+        let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
+        let mut held = vec![0.0; on.rows.len()];
+        for session in &on.rows.sessions {
+            follow(&on.rows.generator, session.clone(), half_rad, 0.0, &mut held);
+        }
+        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0).called(Tag::SIZE)]
+    })
+    .shapes([Shape::by_factors(Name::HalfLashArcsec, 0.5, 60.0, 5)])
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
 }
 
 /// A coupling between the motor's encoder and the generator that gives way: it is wound up by what the load, friction,
@@ -105,7 +123,7 @@ pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         (loaded && timed, "wind-up with time", |on, k| on.base.wind_up[k] * since_begin(on, k)),
     ];
     let offsets = offsets.into_iter().filter(|(there, ..)| *there).map(|(_, name, values)| law(name, values));
-    let mut laws: Vec<Law> = offsets.collect();
+    let mut laws: Vec<Law> = offsets.chain([lash_before_the_generator()]).collect();
     if on.rows.sessions_used().count() > 2 {
         laws.push(zero_of_each_session());
     }

@@ -1,6 +1,7 @@
 //! Causes that follow the torque, beyond the nominal wind-up and play.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 use super::super::prepare::Jump;
 use super::geometry::{Angle, angle, pulse, weighted_waves};
@@ -24,14 +25,21 @@ pub(super) fn stop_operator(on: &Excitation<'_>, slip: f64) -> Vec<f64> {
     let torque = &on.rows.torque;
     let mut held = vec![0.0; torque.len()];
     for session in &on.rows.sessions {
-        let (mut z, mut before) = (0.0, 0.0);
-        for k in session.clone() {
-            z = (z + torque[k] - before).clamp(-slip, slip);
-            before = torque[k];
-            held[k] = z / slip;
-        }
+        let first = torque.get(session.start).map_or(0.0, |t| t.clamp(-slip, slip));
+        follow(torque, session.clone(), slip, first, &mut held);
     }
     held
+}
+
+/// The element through one session, from what it holds at the first row.
+pub(super) fn follow(torque: &[f64], session: Range<usize>, slip: f64, first: f64, held: &mut [f64]) {
+    let mut z = first;
+    for k in session.clone() {
+        if k > session.start {
+            z = (z + torque[k] - torque[k - 1]).clamp(-slip, slip);
+        }
+        held[k] = z / slip;
+    }
 }
 
 /// The spring that a hysteresis is stated by, and those that slip earlier and later: at these shares of its torque.
