@@ -31,7 +31,7 @@ use flexspline::{ImageError, Table};
 use flexspline_make::{ProjectError, WriteError};
 use serde::Serialize;
 
-use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
+use crate::measurement::{Fault, FaultName, MeasuredError, Recording, Session, least_and_most};
 use crate::misfit::LEAVES;
 pub use at_rest::{LoopFigure, TorqueLoop};
 pub(crate) use choose::LEAST_GAIN;
@@ -518,18 +518,14 @@ fn calibrated(files: &[Recording], prior: &Prior<'_>, split: bool) -> Result<Cal
     let mut said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     let parted: Vec<Recording>;
     let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
-        parted = files.iter().flat_map(by_zeros).collect();
+        parted = files.iter().flat_map(|file| by_zeros(file, |session| session.own_zero)).collect();
         &parted
     } else {
         files
     };
-    let anew = with_zeros_anew(files);
-    let files = if are_set_anew(&anew, files, prior) {
-        said.push(SET_ANEW.to_owned());
-        &anew
-    } else {
-        files
-    };
+    let anew = set_anew(files, prior);
+    said.extend(anew.iter().map(|_| SET_ANEW.to_owned()));
+    let files = anew.as_ref().map_or(files, |(pieces, _)| pieces);
     let mut recorded = Recorded::of(files, prior);
     let mut rows = settled(files, prior, &recorded);
     let starts = Starts::of(&rows, &recorded, prior, files);
@@ -567,21 +563,11 @@ fn calibrated(files: &[Recording], prior: &Prior<'_>, split: bool) -> Result<Cal
 const SET_ANEW: &str = "the zero of the output is another one in each session of a log, as where an encoder is set to \
                         zero anew: each is put on its own";
 
-/// Logs with a zero in each of their sessions.
-fn with_zeros_anew(files: &[Recording]) -> Vec<Recording> {
-    let anew = |file: &Recording| {
-        let mut file = file.clone();
-        file.sessions.iter_mut().for_each(|session| session.own_zero = true);
-        by_zeros(&file)
-    };
-    files.iter().flat_map(anew).collect()
-}
-
-/// A file in pieces, each with one zero.
-fn by_zeros(file: &Recording) -> Vec<Recording> {
+/// A file in pieces, each with one zero: where a session begins another.
+fn by_zeros(file: &Recording, begins: impl Fn(&Session) -> bool) -> Vec<Recording> {
     let mut pieces: Vec<Recording> = Vec::new();
     for session in &file.sessions {
-        if pieces.is_empty() || session.own_zero {
+        if pieces.is_empty() || begins(session) {
             pieces.push(file.with_sessions(Vec::new()));
         }
         if let Some(piece) = pieces.last_mut() {
@@ -594,15 +580,21 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     pieces
 }
 
-/// Whether sessions have zeros of their own: these leave far less than one zero for each log, whatever load and
-/// direction do in addition.
-fn are_set_anew(anew: &[Recording], files: &[Recording], prior: &Prior<'_>) -> bool {
-    let recorded = Recorded::of(anew, prior);
-    let rows = settled(anew, prior, &recorded);
+/// Logs in pieces of a session each, with their rows, if sessions have zeros of their own: these leave far less than
+/// one zero for each log, whatever load and direction do in addition.
+fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<(Vec<Recording>, Rows)> {
+    if files.iter().all(|file| file.sessions.len() < 2) {
+        return None;
+    }
+    let anew: Vec<Recording> = files.iter().flat_map(|file| by_zeros(file, |_| true)).collect();
+    let recorded = Recorded::of(&anew, prior);
+    if !recorded.has_torque || recorded.each_keeps_to_one_load {
+        return None;
+    }
+    let rows = settled(&anew, prior, &recorded);
     let long = (0..anew.len()).all(|log| rows.rows.iter().filter(|row| row.at.log == log).count() >= FEWEST_ROWS);
     let left = |rows: &Rows| zero::left_beside_load(rows, recorded.scales.friction_n_m);
-    let sound = anew.len() > files.len() && long && recorded.has_torque && !recorded.each_keeps_to_one_load;
-    sound && left(&rows) < LEAVES * left(&settled(files, prior, &recorded))
+    (long && left(&rows) < LEAVES * left(&settled(files, prior, &recorded))).then_some((anew, rows))
 }
 
 /// A generator that started elsewhere is off by more than this beyond the interval, deg. *Guess*: a degree moves a
@@ -614,7 +606,7 @@ const LEAST_START_DEG: f64 = 1.0;
 pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     let prior = Prior::of_table(table, GeneratorKind::Cam);
     let mut sessions = Vec::new();
-    for mut piece in by_zeros(&log) {
+    for mut piece in by_zeros(&log, |session| session.own_zero) {
         let recorded = Recorded::of(std::slice::from_ref(&piece), &prior);
         let rows = settled(std::slice::from_ref(&piece), &prior, &recorded);
         let found = (rows.rows.len() >= FEWEST_ROWS).then(|| zero::align(table, &rows, recorded.scales.friction_n_m));
@@ -639,9 +631,7 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
 
 /// A log with the output of each session on the zero of the first, if sessions have zeros of their own by a table.
 fn on_one_output_zero(mut log: Recording, prior: &Prior<'_>) -> Recording {
-    let pieces = with_zeros_anew(std::slice::from_ref(&log));
-    if are_set_anew(&pieces, std::slice::from_ref(&log), prior) {
-        let means = settled(&pieces, prior, &Recorded::of(&pieces, prior)).means_arcsec;
+    if let Some((_, Rows { means_arcsec: means, .. })) = set_anew(std::slice::from_ref(&log), prior) {
         let off_arcsec = means.iter().map(|mean| mean - means[0]);
         for (session, off_arcsec) in log.sessions.iter_mut().zip(off_arcsec) {
             session.error_rad.iter_mut().for_each(|error| *error -= off_arcsec / ARCSEC_PER_RAD);
