@@ -168,7 +168,8 @@ impl LookedAt {
             )
         });
         say(place, stress, 1.0, YIELD_MPA, &|stress| match self.root_fillet_mpa {
-            Some([one, _]) if place == ROOT_FILLET => format!(
+            // Where no finer mesh found equilibrium the two are one.
+            Some([one, judged]) if place == ROOT_FILLET && one != judged => format!(
                 "a root fillet has {stress:.0} MPa on a finer mesh and {one:.0} on this one; {YIELD_MPA} MPa are where \
                  steel yields: simulate --stress judges it over three meshes"
             ),
