@@ -497,7 +497,15 @@ fn given_twice(files: &[Recording]) -> Option<[&str; 2]> {
 /// # Errors
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
-    calibrated(files, prior, false)
+    calibrated(files, prior, |fit| report(fit, false))
+}
+
+/// The table alone, nothing said of it.
+///
+/// # Errors
+/// As [`calibrate`].
+pub(crate) fn calibrated_table(files: &[Recording], prior: &Prior<'_>) -> Result<MadeTable, CalibrationError> {
+    calibrated(files, prior, |fit| Ok(fit.made))
 }
 
 /// The same with its error [split](Split) into what the encoders and the gear have of it.
@@ -505,10 +513,30 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
 /// # Errors
 /// As [`calibrate`].
 pub fn calibrate_and_split(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
-    calibrated(files, prior, true)
+    calibrated(files, prior, |fit| report(fit, true))
 }
 
-fn calibrated(files: &[Recording], prior: &Prior<'_>, split: bool) -> Result<Calibrated, CalibrationError> {
+/// A fit whose table can be made, and that table.
+struct FitOfLogs<'f> {
+    /// The logs, zeros and delays taken out.
+    files: &'f [Recording],
+    delays: Option<Delays>,
+    zeros: Vec<Reading>,
+    prior: &'f Prior<'f>,
+    alignment: Option<Alignment>,
+    recorded: &'f Recorded,
+    fitted: Fitted,
+    made: MadeTable,
+    /// Noted of zeros and ratio.
+    said: Vec<String>,
+}
+
+/// What is said of the fit to logs.
+fn calibrated<T>(
+    files: &[Recording],
+    prior: &Prior<'_>,
+    say: impl FnOnce(FitOfLogs<'_>) -> Result<T, CalibrationError>,
+) -> Result<T, CalibrationError> {
     if let Some([one, other]) = given_twice(files) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
@@ -554,9 +582,12 @@ fn calibrated(files: &[Recording], prior: &Prior<'_>, split: bool) -> Result<Cal
     let told = alignment.as_ref().filter(|found| found.told);
     let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
     let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
-    let made = fit_with_table(at_one_instant, prior, (&rows, &recorded))
-        .and_then(|made| report((at_one_instant, delays, zeros), (prior, alignment), &recorded, made, (said, split)));
-    made.map_err(|error| with_faults(error, files, &notes))
+    let (files_read, recorded) = (at_one_instant, &recorded);
+    fit_with_table(files_read, prior, (&rows, recorded))
+        .and_then(|(fitted, made)| {
+            say(FitOfLogs { files: files_read, delays, zeros, prior, alignment, recorded, fitted, made, said })
+        })
+        .map_err(|error| with_faults(error, files, &notes))
 }
 
 /// Note on sessions of one log that have other zeros.
@@ -671,15 +702,9 @@ fn fit_with_table(
     })
 }
 
-/// Report on a table and the fit that it is of, to logs whose `zeros` and delays were taken out; `said` is noted of
-/// these and of the ratio, and the error is split if that was asked.
-fn report(
-    (files, delays, zeros): (&[Recording], Option<Delays>, Vec<Reading>),
-    (prior, alignment): (&Prior<'_>, Option<Alignment>),
-    recorded: &Recorded,
-    (fitted, made): (Fitted, MadeTable),
-    (said, split): (Vec<String>, bool),
-) -> Result<Calibrated, CalibrationError> {
+/// Report on a table and the fit that it is of; the error is split if that was asked.
+fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationError> {
+    let FitOfLogs { files, delays, zeros, prior, alignment, recorded, fitted, made, said } = fit;
     let parts = fitted.judged(recorded, prior);
     let agreement = fitted.agreement();
     let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use rayon::prelude::*;
+
 use super::choose::{LEAST_GAIN, PENALTIES};
 use super::folds::{Chosen, Folds, Row};
 use super::interval::OF_95;
@@ -155,8 +157,9 @@ impl Starts {
         let begins = |log: usize| files[log].sessions.first().map_or(0.0, |session| session.zero_off_rad);
         let first = Start { zero_rad: Some([0.0; 2]), output_turns: 0.0 };
         let logs = if files.len() > MOST_LOGS { 1 } else { files.len() };
-        let others = (1..logs).map(|log| pair(log).start(begins(log) - begins(0)));
-        let all: Vec<Start> = std::iter::once(first).chain(others).collect();
+        let others = (1..logs).into_par_iter().map(|log| pair(log).start(begins(log) - begins(0)));
+        let mut all: Vec<Start> = others.collect();
+        all.insert(0, first);
         let elsewhere = |start: &Start| start.output_turns != 0.0 || start.zero_rad.is_none_or(|[zero, _]| zero != 0.0);
         all.iter().any(elsewhere).then_some(Starts(all))
     }

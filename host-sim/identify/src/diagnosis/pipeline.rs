@@ -19,7 +19,7 @@ use thiserror::Error;
 use super::report::{Cause, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose_extended};
 use super::{channels, torque_zero, zeros};
-use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrate, check_ratio_of};
+use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrated_table, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
     CauseEntry, Evaluation, ExtendedTables, Model, TableKind, TableSubject, causes_to_toml, evaluate, found_geometry,
@@ -515,7 +515,7 @@ impl Diagnosed {
         }
         let known = self.known_table.as_ref().map(|made| Table::check(&made.image)).transpose();
         let known = known.map_err(PipelineError::Image)?;
-        Ok(calibrate(&[recording], &subject.prior(known.as_ref()))?.table)
+        Ok(calibrated_table(&[recording], &subject.prior(known.as_ref()))?)
     }
 }
 

@@ -69,9 +69,10 @@ pub(crate) fn lines(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
         let is_there = power > (count * 4.0).ln() + 12.0 && size_arcsec > least;
         is_there.then_some(SpectralLine { per, order, size_arcsec })
     };
-    let by_angle = line(Per::GeneratorTurn, 0.0, HIGHEST_ORDER.min(rows.highest_order()));
+    let by_angle = || line(Per::GeneratorTurn, 0.0, HIGHEST_ORDER.min(rows.highest_order()));
     let in_time = || line(Per::Second, SLOWEST_LINE_HZ, 0.5 / rows.period);
-    by_angle.into_iter().chain(rows.recorded.time.then(in_time).flatten()).collect()
+    let (by_angle, in_time) = rayon::join(by_angle, || rows.recorded.time.then(in_time).flatten());
+    by_angle.into_iter().chain(in_time).collect()
 }
 
 /// The angle of each row in which a line repeats, rad; a second is a turn.

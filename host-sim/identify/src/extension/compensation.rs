@@ -10,7 +10,7 @@ use flexspline::{Prediction, Table};
 use serde::Serialize;
 
 use super::sampled::ExtendedTables;
-use crate::calibrate::{LEAST_GAIN, Prior, calibrate};
+use crate::calibrate::{LEAST_GAIN, Prior, calibrated_table};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::diagnosis::{Compensation, Extended, Series};
 use crate::measurement::{Recording, Session, rms};
@@ -203,8 +203,8 @@ pub fn evaluate(
     }
     let learnt = sessions.iter().zip(&used).filter(|(_, used)| **used).map(|(session, _)| session.clone());
     let learnt = measured.with_sessions(learnt.collect());
-    let by_calibrated = match calibrate(&[learnt], prior) {
-        Ok(made) => by_image(made.table.image),
+    let by_calibrated = match calibrated_table(&[learnt], prior) {
+        Ok(made) => by_image(made.image),
         Err(why) => {
             evaluation.not_made.extend(why.to_string().lines().next().map(str::to_owned));
             None

@@ -15,6 +15,7 @@ pub use rows::{Axis, SizeMismatch};
 pub(crate) use spectrum::strongest;
 pub use spectrum::{OrderSpectrum, Peak, order_spectrum};
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::diagnosis::rows::Rows;
@@ -44,7 +45,7 @@ impl Picture {
         }
         let centred = centred_by_direction(rows, residual_arcsec);
         let spectrum = |axis: Axis| order_spectrum(axis, &axis.angles(rows), &centred, ratio);
-        let spectra = Axis::ALL.into_iter().map(spectrum).collect();
+        let spectra = Axis::ALL.into_par_iter().map(spectrum).collect();
         Ok(Picture { rows: needed, rms_arcsec: rms(residual_arcsec), spectra })
     }
 }
