@@ -594,7 +594,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let met = self.terms.iter().find(|t| t.law.meets(law)).map(|t| (t, SMALLER));
         // Under an eccentric generator it shows as another order than alone: no lead points there. Both are pressed in
         // alike.
-        let under = |t: &&&Term<'_>| t.law.is_in_zones() && t.law.acts_on(law) && !t.law.meets(law);
+        let under = |t: &&&Term<'_>| t.law.acts.zones.is_some() && t.law.acts_on(law) && !t.law.meets(law);
         let lobes =
             self.terms.iter().find(under).map(|t| (t, BESIDE_ARCSEC.map(|arcsec| law.shapes[size].place(arcsec))));
         for (is_met, (other, sizes)) in [(true, met), (false, lobes)].into_iter().filter_map(|(a, b)| Some((a, b?))) {

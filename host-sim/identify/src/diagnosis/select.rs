@@ -246,17 +246,17 @@ fn best_tried<'l>(
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (mut terms, mut refused) = (Vec::new(), Vec::new());
     for law in laws.iter().filter(|law| found.iter().all(|(_, other, _)| other.id() != law.id())) {
-        refused.push((*law, Vec::new(), vec![Judged::plain(Gate::Refined, false)]));
+        refused.push((*law, vec![Judged::plain(Gate::Refined, false)]));
     }
     let mut counted = HashSet::new();
     let mut least = f64::INFINITY;
     for (evidence, law, places) in found {
         let too_late = || vec![Judged { passed: false, ..Judged::above(Gate::Refined, evidence, least) }];
         if counted.len() > most {
-            refused.push((law, places, too_late()));
+            refused.push((law, too_late()));
             continue;
         }
-        let term = scaffold.term(law, places.clone());
+        let term = scaffold.term(law, places);
         // Where a lead points is only near; what changes other terms may make sense where they have settled.
         let open = law.search.lead.is_some() || scaffold.acted_on_by(law);
         let fit = if open { None } else { Some(scaffold.fit(Some(&term))) };
@@ -268,11 +268,11 @@ fn best_tried<'l>(
             counted.insert(law.id());
         } else if law.shapes.is_empty() || !counted.is_empty() {
             // What tells the data better than all these may make sense at places nearby; others do not.
-            refused.push((law, places, refused_for));
+            refused.push((law, refused_for));
             continue;
         }
         if counted.len() > most {
-            refused.push((law, places, too_late()));
+            refused.push((law, too_late()));
             continue;
         }
         least = evidence;
@@ -453,8 +453,8 @@ pub(super) fn earns(
     all
 }
 
-/// A law that was dropped before it was compared: its places, and what it was asked.
-type Dropped<'l> = (&'l Law, Vec<f64>, Vec<Judged>);
+/// A law that was dropped before it was compared, and what it was asked.
+type Dropped<'l> = (&'l Law, Vec<Judged>);
 /// A selection that has grown by a term, and the evidence that it gains.
 type Grown<'l> = (f64, Selected<'l>);
 
@@ -514,7 +514,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             if passed(&gates) {
                 open.push(law);
             } else {
-                self.trace.judged(Stage::Tried, law, &[], None, gates);
+                self.trace.decided(Stage::Tried, law.label, None, gates);
             }
         }
         let scaffold = Scaffold::new(problem, &selected.terms);
@@ -526,24 +526,24 @@ impl<'l> Chooser<'_, '_, 'l> {
             (tried(&scaffold, &open, |law| self.bests.begin_close(law)), REFINED_AGAIN)
         };
         let (found, refused) = best_tried(&scaffold, &open, tried, most);
-        for (law, places, gates) in refused {
-            self.trace.judged(Stage::Tried, law, &places, None, gates);
+        for (law, gates) in refused {
+            self.trace.decided(Stage::Tried, law.label, None, gates);
         }
         let before = selected.fit.solution.evidence;
         let refine = |term: Term<'l>| -> Result<Grown<'l>, Dropped<'l>> {
-            let (law, places) = (term.law, term.places.clone());
-            let Some((refined, fit)) = scaffold.refine_towards(term, before) else {
-                return Err((law, places, vec![Judged::plain(Gate::Gain, false)]));
+            let law = term.law;
+            let Some((refined, fit)) = scaffold.refine(term) else {
+                return Err((law, vec![Judged::plain(Gate::Gain, false)]));
             };
-            let (sense, places) = (sense(&refined, fit.last()), refined.places.clone());
+            let sense = sense(&refined, fit.last());
             if !passed(&sense) && !scaffold.acted_on_by(law) {
-                return Err((law, places, sense.to_vec()));
+                return Err((law, sense.to_vec()));
             }
             let mut next = Selected { terms: [&selected.terms[..], &[refined]].concat(), fit };
             if !passed(&sense) {
                 // What changes others was refined with what they do without it.
                 let settled = settle(problem, next).filter(Selected::is_sound);
-                next = settled.ok_or_else(|| (law, places, sense.to_vec()))?;
+                next = settled.ok_or_else(|| (law, sense.to_vec()))?;
             }
             Ok((next.evidence() - before, next))
         };
@@ -552,7 +552,7 @@ impl<'l> Chooser<'_, '_, 'l> {
         for outcome in refined {
             match outcome {
                 Ok(next) => grown.push(next),
-                Err((law, places, gates)) => self.trace.judged(Stage::Forward, law, &places, None, gates),
+                Err((law, gates)) => self.trace.decided(Stage::Forward, law.label, None, gates),
             }
         }
         for (_, next) in grown.iter().filter(|(gain, _)| everything && *gain > CLOSE_GAIN) {
@@ -575,7 +575,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             let misfit = misfit_as(term.law, selected.terms.iter().zip(&standings));
             let gates = gates(term.law, &standing, self.least, misfit, strongest);
             let passes = passed(&gates);
-            self.trace.judged(Stage::Forward, term.law, &term.places, None, gates);
+            self.trace.decided(Stage::Forward, term.law.label, None, gates);
             if passes {
                 for (less, other) in grown {
                     let other = other.newest();
@@ -583,14 +583,14 @@ impl<'l> Chooser<'_, '_, 'l> {
                         self.bests.came_close(other);
                     }
                     let behind = Judged { passed: false, ..Judged::above(Gate::First, less, gain) };
-                    self.trace.judged(Stage::Forward, other.law, &other.places, Some(term.law.label), vec![behind]);
+                    self.trace.decided(Stage::Forward, other.law.label, Some(term.law.label), vec![behind]);
                 }
                 return Some(next);
             }
         }
         for (gain, next) in grown {
             let gates = vec![Judged::above(Gate::Gain, gain, LEAST_GAIN)];
-            self.trace.judged(Stage::Forward, next.newest().law, &next.newest().places, None, gates);
+            self.trace.decided(Stage::Forward, next.newest().law.label, None, gates);
         }
         None
     }
@@ -606,7 +606,7 @@ impl<'l> Chooser<'_, '_, 'l> {
                 .min_by(|(a, _), (b, _)| standings[*a].evidence.total_cmp(&standings[*b].evidence));
             let Some((k, gates)) = weakest else { break };
             let gone = selected.terms.remove(k);
-            self.trace.judged(Stage::Backward, gone.law, &gone.places, None, gates);
+            self.trace.decided(Stage::Backward, gone.law.label, None, gates);
             selected = settle_each(problem, Selected::of(problem, selected.terms)?, true)?;
         }
         Some(selected)

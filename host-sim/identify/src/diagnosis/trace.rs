@@ -11,8 +11,8 @@ use std::io::Write as _;
 use serde::Serialize;
 use serde::ser::Serializer;
 
-use super::candidate::{Label, Law};
-use crate::causes::{CauseName, Need, ParameterName};
+use super::candidate::Label;
+use crate::causes::{CauseName, Need};
 
 table! {
     /// Where in the search a decision fell.
@@ -44,11 +44,6 @@ impl Stage {
     pub const fn words(self) -> &'static str {
         self.row()
     }
-}
-
-/// The name of a stage or a gate in files.
-fn name_of(value: &impl Serialize) -> String {
-    serde_json::to_value(value).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 table! {
@@ -159,8 +154,6 @@ pub(crate) fn passed(gates: &[Judged]) -> bool {
 pub struct Decision {
     /// The law that was judged.
     pub label: Label,
-    /// Its shape parameters.
-    pub shape: Vec<(ParameterName, f64)>,
     /// Where.
     pub stage: Stage,
     /// In which round of the search, from 1; 0 before it.
@@ -189,26 +182,6 @@ impl Decision {
     }
 }
 
-impl fmt::Display for Decision {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {} {} {}", self.round, name_of(&self.stage), if self.passed() { '+' } else { '-' }, self.label)?;
-        for (k, (name, value)) in self.shape.iter().enumerate() {
-            write!(f, "{}{name} {value:.4}", if k == 0 { " at " } else { ", " })?;
-        }
-        if let Some(against) = self.against {
-            write!(f, ", against {against}")?;
-        }
-        for (k, judged) in self.gates.iter().enumerate() {
-            write!(f, "{} {}", if k == 0 { ':' } else { ',' }, name_of(&judged.gate))?;
-            if let (Some(value), Some(limit)) = (judged.value, judged.limit) {
-                write!(f, " {value:.2} of {limit:.2}")?;
-            }
-            f.write_str(if judged.passed { "" } else { " (no)" })?;
-        }
-        Ok(())
-    }
-}
-
 /// All decisions in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
@@ -230,26 +203,10 @@ impl Trace {
         self.round += 1;
     }
 
-    /// A decision on a law at places of its shape parameters, held against another where there is one.
-    pub(super) fn judged(
-        &mut self,
-        stage: Stage,
-        law: &Law,
-        places: &[f64],
-        against: Option<Label>,
-        gates: Vec<Judged>,
-    ) {
-        let shape = law.shapes.iter().map(|shape| shape.name).zip(law.values(places)).collect();
-        self.push(Decision { label: law.label, shape, stage, round: self.round, against, gates });
-    }
-
-    /// A decision on a cause that has no law here, or on what is named.
+    /// A decision on a law or a cause, held against another where there is one.
     pub(super) fn decided(&mut self, stage: Stage, label: Label, against: Option<Label>, gates: Vec<Judged>) {
-        self.push(Decision { label, shape: Vec::new(), stage, round: self.round, against, gates });
-    }
-
-    fn push(&mut self, step: Decision) {
-        self.say(&step);
+        let step = Decision { label, stage, round: self.round, against, gates };
+        self.say(&serde_json::to_string(&TraceEntries(vec![&step])).unwrap_or_default());
         self.steps.push(step);
     }
 

@@ -36,7 +36,7 @@ pub(super) fn conclude(
     let standings = standings(problem, selected);
     for (k, term) in selected.terms.iter().enumerate() {
         let gates = select::earns(problem, selected, &standings, k, select::least_size(noise.white));
-        trace.judged(Stage::Settled, term.law, &term.places, None, gates);
+        trace.decided(Stage::Settled, term.law.label, None, gates);
     }
     // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or
     // without a cause.

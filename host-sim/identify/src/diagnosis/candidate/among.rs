@@ -54,7 +54,7 @@ impl Law {
     pub(crate) fn acts_on(&self, other: &Law) -> bool {
         // A spring that is out of tolerance is one under the torque recorded.
         self.is_load() && !other.is_load() && !other.is_spring()
-            || other.acts.meets_zones && (self.is_in_zones() || self.wrong.kin == Kin::Clearance)
+            || other.acts.meets_zones && (self.acts.zones.is_some() || self.wrong.kin == Kin::Clearance)
     }
 
     /// Whether it is the spring of the nominal model that is softer or stiffer.

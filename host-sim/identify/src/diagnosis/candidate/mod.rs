@@ -420,7 +420,7 @@ pub(crate) struct Acts {
     /// Load (N·m, row by row) that the cause adds to the torque that was recorded.
     load: Option<AddedLoad>,
     /// How far it brings one zone of teeth ahead of the other.
-    zones: Option<Apart>,
+    pub zones: Option<Apart>,
     /// The effect of other causes on the zones of teeth and on the clearance enters the law.
     pub meets_zones: bool,
     /// Much of it shows while the play is crossed, in rows that do not count for the sizes of others.
@@ -631,12 +631,6 @@ impl Law {
     #[must_use]
     pub(crate) fn zones(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Option<Zones> {
         self.acts.zones.as_ref().map(|apart| apart(on, self.shaped(values), coefficients))
-    }
-
-    /// Whether it brings one zone of teeth ahead of the other.
-    #[must_use]
-    pub(crate) fn is_in_zones(&self) -> bool {
-        self.acts.zones.is_some()
     }
 
     /// Which of the shape parameters has this name.
