@@ -383,11 +383,6 @@ const DIRECTIONS: usize = 8;
 const SMALLER: [f64; 2] = [0.05, 0.2];
 /// Sizes at which one is tried under an eccentric generator, arcsec. *Guess*: a small and a usual one.
 const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
-/// All steps together gain no more than this multiple of what the linear model of the first one promises, … *Guess*:
-/// models bend, but rarely as much as that.
-const FARTHER_THAN_LINEAR: f64 = 3.0;
-/// … and this much evidence. *Guess*: above the 6 from which a cause may be named.
-const BEYOND_LINEAR: f64 = 10.0;
 /// A step that promises less evidence than this is not tried. *Guess*: far below what decides anything.
 const LEAST_PROMISED: f64 = 0.1;
 /// A step that gains less evidence than this is the last one. *Guess*: far below what decides anything.
@@ -675,28 +670,18 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// Moves the shape parameters of `term` to where the misfit is least, beside the terms of the scaffold.
     #[must_use]
-    pub(crate) fn refine<'n>(&self, term: Term<'n>) -> Option<(Term<'n>, Fit)> {
-        self.refine_towards(term, f64::NEG_INFINITY)
-    }
-
-    /// As [`Scaffold::refine`], but nothing where the first step shows that this evidence is out of reach.
-    #[must_use]
-    pub(crate) fn refine_towards<'n>(&self, mut term: Term<'n>, least_evidence: f64) -> Option<(Term<'n>, Fit)> {
+    pub(crate) fn refine<'n>(&self, mut term: Term<'n>) -> Option<(Term<'n>, Fit)> {
         let mut fit = self.fit(Some(&term))?;
         if term.places.is_empty() {
             return Some((term, fit));
         }
-        for step in 0..STEPS {
+        for _ in 0..STEPS {
             let coefficients = fit.of(fit.starts.len() - 1).to_vec();
             let free = self.fit_with(Some(&term.white), Some(&Set::new(self.derivatives(&term, &coefficients))))?;
             let moves = &free.solution.coefficients[fit.priors.len()..];
             let now = fit.solution.evidence;
             let promised = 0.5 * (fit.solution.misfit - free.solution.misfit);
             term.occam = (free.solution.evidence - now - promised).min(0.0) - term.law.search.odds_against;
-            let in_reach = now + FARTHER_THAN_LINEAR * (free.solution.evidence - now).max(0.0) + BEYOND_LINEAR;
-            if step == 0 && in_reach < least_evidence {
-                return None;
-            }
             // The linear model of a step says what it can gain.
             if promised < LEAST_PROMISED {
                 break;

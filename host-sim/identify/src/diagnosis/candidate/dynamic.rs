@@ -76,19 +76,19 @@ pub(super) fn columns_of_load(on: &Excitation<'_>, added: &[f64], law: PlayLaw) 
 
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and
 /// moves the play. On a drive without load, `on_sample` says where to begin.
-fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>) -> Law {
+fn gravity_torque(play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
     // Next to no moment of a law of another play is that play alone; with the play that is there it adds next to
     // nothing.
     let least = if play == on.base.law { LEAST_MOMENT } else { LEAST_MOMENT_OF_ANOTHER_PLAY };
     let load = move |on: &Excitation<'_>, [moment, phase]: [f64; 2]| -> Vec<f64> {
         let rows = on.rows;
-        by_row(on, |k| moment * (rows.output[k] + sign * rows.orientation[k] + phase).sin())
+        by_row(on, |k| moment * (rows.output[k] + rows.orientation[k] + phase).sin())
     };
     let of = |shape: Shaped<'_>| [shape.of(Name::TorqueNM), shape.of(Name::PhaseRad)];
     // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
     let by_flank = on.unloaded().then(|| moment_that_turns_flanks(on_sample, play, scale, load));
-    let mut law = Law::new(CauseName::GravityTorque, move |on, shape| columns_of_load(on, &load(on, of(shape)), play))
+    Law::new(CauseName::GravityTorque, move |on, shape| columns_of_load(on, &load(on, of(shape)), play))
         .shapes([
             Shape::by_factors(Name::TorqueNM, 0.75 * least * scale, 2.0 * scale, 1),
             Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
@@ -108,7 +108,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
                     let more = on.nominal.wind_up_arcsec(rows.torque[k] + 0.5);
                     more - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5)
                 };
-                let at = |k: usize| rows.output[k] + sign * rows.orientation[k];
+                let at = |k: usize| rows.output[k] + rows.orientation[k];
                 vec![
                     main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale).called(SINE),
                     main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale).called(COSINE),
@@ -124,9 +124,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
                     .map(|[moment, phase]| shape.with(&[(Name::TorqueNM, moment), (Name::PhaseRad, phase)]))
                     .collect()
             },
-        );
-    law.acts.in_crossings = true;
-    law
+        )
 }
 
 /// Least moment, as a share of the load. *Guess*: moments of 0.09 and 0.13 N·m of examinations, 2.1 and 2.6″ rms, were
@@ -296,9 +294,7 @@ fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
     }
     let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
     let on_sample = thinned.as_ref().map_or(*on, |thinned| on.over(&thinned.rows, &thinned.base));
-    let of = |sign, play: PlayLaw| gravity_torque(sign, play, on, &on_sample).variant(play.as_str());
-    let both = |play| [Some(of(1.0, play)), on.is_turned_about().then(|| of(-1.0, play).counted_back())];
-    plays.into_iter().flat_map(both).flatten().collect()
+    plays.into_iter().map(|play| gravity_torque(play, on, &on_sample).variant(play.as_str())).collect()
 }
 
 /// Gravity turns an unbalanced load, which the torque column does not hold.
@@ -317,7 +313,7 @@ pub(crate) const GRAVITY_TORQUE: CauseSpec = CauseSpec {
     laws: gravity_torques,
     simulated: |on, p| {
         let shape = [Name::TorqueNM, Name::PhaseRad].map(|name| (name, p(name)));
-        gravity_torque(1.0, on.base.law, on, on).with(&shape, [])
+        gravity_torque(on.base.law, on, on).with(&shape, [])
     },
     ..plain()
 };

@@ -51,8 +51,8 @@ pub(crate) enum Angle {
     Output,
     Flexspline,
     CircularSpline,
-    /// Gravity as the wave sees it, orientation counted with this sign.
-    Gravity(f64),
+    /// Gravity as the wave sees it.
+    Gravity,
 }
 
 impl From<Wheel> for Angle {
@@ -70,7 +70,7 @@ pub(super) fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
         Angle::Output => on.rows.output[k],
         Angle::Flexspline => on.rows.on_flexspline[k],
         Angle::CircularSpline => on.rows.on_circular_spline[k],
-        Angle::Gravity(sign) => on.rows.generator[k] + sign * on.rows.orientation[k],
+        Angle::Gravity => on.rows.generator[k] + on.rows.orientation[k],
     }
 }
 
@@ -95,7 +95,7 @@ pub(super) fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc
     let which = match of {
         Angle::Flexspline => 0,
         Angle::CircularSpline => 1,
-        Angle::Gravity(sign) => 2 + i8::from(sign > 0.0),
+        Angle::Gravity => 2,
         Angle::Generator => 4,
         Angle::Output => 5,
     };
@@ -527,11 +527,7 @@ pub(crate) const GRAVITY_SIDE_LOAD: CauseSpec = CauseSpec {
     in_table: InTable::AtOneOrientation,
     place: |placing| placing.set_offset(),
     parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, against gravity"), HALF_LOAD],
-    laws: |on| {
-        let counted = |sign: f64| displacement(CauseName::GravitySideLoad, Angle::Gravity(sign), on);
-        let back = on.is_turned_about().then(|| counted(-1.0).counted_back());
-        std::iter::once(counted(1.0)).chain(back).collect()
-    },
-    simulated: |on, p| simulated_displacement(CauseName::GravitySideLoad, Angle::Gravity(1.0), on, p),
+    laws: |on| vec![displacement(CauseName::GravitySideLoad, Angle::Gravity, on)],
+    simulated: |on, p| simulated_displacement(CauseName::GravitySideLoad, Angle::Gravity, on, p),
     ..DISPLACEMENT
 };

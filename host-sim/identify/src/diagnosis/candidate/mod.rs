@@ -157,12 +157,6 @@ impl<'a> Excitation<'a> {
         self.nominal.kernels.as_ref().filter(|_| self.nominal.teeth.is_some())
     }
 
-    /// Whether the drive is turned against gravity during the data.
-    fn is_turned_about(&self) -> bool {
-        let orientation = &self.rows.orientation;
-        orientation.iter().any(|o| (o - orientation[0]).abs() > 1e-3)
-    }
-
     /// Nominal wind-up at rest, arcsec/N·m; none for a drive that does not give.
     fn slope_at_rest(&self) -> Option<f64> {
         let slope = self.nominal.wind_up_arcsec(1e-3) / 1e-3;
@@ -515,12 +509,6 @@ impl Law {
         self.wrong.most_nuisance = MOST_NUISANCE_OF_KNOWN;
         self
     }
-    /// A law of gravity whose orientation is counted against the output angle.
-    fn counted_back(mut self) -> Law {
-        let comma = if self.variant.is_empty() { "" } else { ", " };
-        self.variant = format!("{}{comma}orientation counted back", self.variant).into();
-        self
-    }
     /// An encoder that reads what a wheel may do as well: odds are on the wheel, and its misfit may look like this law.
     fn after_wheels(mut self) -> Law {
         self.search.odds_against = AFTER_WHEELS;
@@ -558,6 +546,8 @@ impl Law {
     }
     fn adds_load(mut self, load: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync + 'static) -> Law {
         self.acts.load = Some(Arc::new(load));
+        // It moves the torque at which the play is crossed.
+        self.acts.in_crossings = true;
         self
     }
     fn parts_zones(

@@ -152,29 +152,27 @@ fn lubricant_viscosity(on: &Excitation<'_>) -> Law {
         let drag_n_m = shape.of(Name::DragNM);
         Drag::of(shape).share(on).into_iter().map(|share| drag_n_m * share).collect()
     };
-    let mut law =
-        Law::new(CauseName::LubricantViscosity, move |on, shape| columns_of_load(on, &load(on, shape), on.base.law))
-            .shapes([
-                Shape::by_factors(Name::DragNM, 0.001 * scale, 1.0 * scale, 1),
-                Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 2),
-                Shape::by_factors(Name::PerK, 0.008, 0.12, 3),
-                Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
-            ])
-            .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Tag::SIZE)))
-            .physical_if(|shape, c| c.of(Tag::SIZE) > 0.0 && Drag::of(shape).is_viscous())
-            .evaluated_on_averages()
-            .adds_load(load)
-            .led_by(
-                |on, shape| {
-                    // Arcsec for 1 N·m of it at the mean speed and the nominal temperature.
-                    let slope = on.slope_at_rest().unwrap_or(0.0);
-                    let wind_up = Drag::of(shape).share(on).into_iter().map(|share| share * slope).collect();
-                    vec![main(wind_up, 10.0).called(Tag::SIZE)]
-                },
-                |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Tag::SIZE).max(0.0))])],
-            );
-    law.acts.in_crossings = true;
-    law.variant("load")
+    Law::new(CauseName::LubricantViscosity, move |on, shape| columns_of_load(on, &load(on, shape), on.base.law))
+        .shapes([
+            Shape::by_factors(Name::DragNM, 0.001 * scale, 1.0 * scale, 1),
+            Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 2),
+            Shape::by_factors(Name::PerK, 0.008, 0.12, 3),
+            Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
+        ])
+        .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Tag::SIZE)))
+        .physical_if(|shape, c| c.of(Tag::SIZE) > 0.0 && Drag::of(shape).is_viscous())
+        .evaluated_on_averages()
+        .adds_load(load)
+        .led_by(
+            |on, shape| {
+                // Arcsec for 1 N·m of it at the mean speed and the nominal temperature.
+                let slope = on.slope_at_rest().unwrap_or(0.0);
+                let wind_up = Drag::of(shape).share(on).into_iter().map(|share| share * slope).collect();
+                vec![main(wind_up, 10.0).called(Tag::SIZE)]
+            },
+            |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Tag::SIZE).max(0.0))])],
+        )
+        .variant("load")
 }
 
 /// The clearance follows the temperature.
