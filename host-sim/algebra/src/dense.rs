@@ -43,6 +43,14 @@ impl CholeskyFactor {
     }
 }
 
+/// Eigenvalues of a symmetric matrix, of which the lower triangle is read, and its eigenvectors, the columns of a
+/// matrix; nothing where they are not found.
+#[must_use]
+pub fn eigen(matrix: MatRef<'_>) -> Option<(Vec<f64>, Mat)> {
+    let found = matrix.self_adjoint_eigen(Side::Lower).ok()?;
+    Some((found.S().column_vector().iter().copied().collect(), found.U().to_owned()))
+}
+
 /// `A B`.
 #[must_use]
 pub fn product(a: MatRef<'_>, b: MatRef<'_>) -> Mat {

@@ -8,7 +8,7 @@ mod dense;
 mod fourier;
 mod sparse;
 
-pub use dense::{CholeskyFactor, Mat, MatRef, cholesky, product};
+pub use dense::{CholeskyFactor, Mat, MatRef, cholesky, eigen, product};
 pub use fourier::{Complex, spectrum};
 pub use sparse::SparseCholesky;
 

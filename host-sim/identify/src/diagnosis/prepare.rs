@@ -12,9 +12,10 @@ use super::candidate::{Excitation, Law, Regressor, Tolerance};
 use super::model::{Problem, Term};
 use super::noise::{Noise, Whitener, white_level};
 use super::report::Finding;
-use super::rows::{Rows, add_scaled, quantile, rms, robust_std};
+use super::rows::{Rows, add_scaled, combined, quantile, rms, robust_std};
 use crate::linear::{Gram, Prior, solve};
 use crate::nominal::Nominal;
+use flexspline_algebra::{Mat, eigen};
 use flexspline_base::units::ARCSEC_PER_TURN;
 
 /// Averages from which the drift of the noise is found, about. *Guess*: enough for correlation times of seconds in
@@ -308,7 +309,7 @@ impl FreeColumns {
         let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
         let grain = Grain::new(averaged, &plain);
         let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
-        let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
+        let of_law = |law: &Law| -> Vec<Vec<f64>> {
             let tried = law.tried();
             let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
             let on = grain.excitation(law.smooth(), on);
@@ -316,17 +317,35 @@ impl FreeColumns {
             let counts =
                 |column: &Regressor| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
             let wide = |column: Regressor| {
-                let averaged = grain.average(law.smooth(), &plain, &column.values);
+                let mut averaged = grain.average(law.smooth(), &plain, &column.values);
                 let std = 20.0 / rms(&averaged).max(1e-9);
-                (averaged, Prior { mean: 0.0, std })
+                averaged.iter_mut().for_each(|value| *value *= std);
+                averaged
             };
             all.filter(counts).map(wide).collect()
         };
-        let by_law: Vec<Vec<(Vec<f64>, Prior)>> = laws.par_iter().with_max_len(1).map(of_law).collect();
-        let all = on.base.floating.iter().map(floating).chain(by_law.into_iter().flatten());
-        let (columns, priors) = all.unzip();
+        let by_law: Vec<Vec<Vec<f64>>> = laws.par_iter().with_max_len(1).map(of_law).collect();
+        let of_laws = directions(by_law.concat()).into_iter().map(|column| (column, Prior { mean: 0.0, std: 1.0 }));
+        let (columns, priors) = on.base.floating.iter().map(floating).chain(of_laws).unzip();
         FreeColumns { stride, columns, priors }
     }
+}
+
+/// Directions in which free columns add more than this to a row, arcsec, say as much as all of them: the least white
+/// noise that is taken.
+const LEAST_ADDED: f64 = 1e-3;
+
+/// Columns, each with a coefficient of unit variance, as fewer that add the same: the principal components. Laws at
+/// several places of their shapes are much alike, and each hypothesis of the noise takes all of them.
+fn directions(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let rows = columns.first().map_or(0, Vec::len);
+    let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let gram = Gram::of(&views, 0..rows);
+    let products = Mat::from_fn(gram.size, gram.size, |i, j| gram.at(i, j));
+    let Some((values, vectors)) = eigen(products.as_ref()) else { return columns };
+    let adds = |k: &usize| values[*k] > LEAST_ADDED * LEAST_ADDED * rows as f64;
+    let along = |k: usize| combined(rows, views.iter().copied(), vectors.col_as_slice(k));
+    (0..values.len()).filter(adds).collect::<Vec<_>>().into_par_iter().map(along).collect()
 }
 
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by
