@@ -180,10 +180,19 @@ pub fn evaluate(
     let by_image = |image: Vec<u8>| Table::check(&image).ok().map(|table| by_table(&table));
     let none = sessions.iter().map(|session| session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD).collect());
     let none: Vec<Vec<f64>> = none.collect();
-    let by_nominal = match tables.table {
-        Some(table) => Some(by_table(table)),
-        None => tables.nominal(fitted.or(Some(found))).ok().and_then(|made| by_image(made.image)),
-    };
+    let learnt = sessions.iter().zip(&used).filter(|(_, used)| **used).map(|(session, _)| session.clone());
+    let learnt = [measured.with_sessions(learnt.collect())];
+    let with_causes = fitted.filter(|_| !evaluation.applied.is_empty());
+    let ((by_nominal, extended), calibrated) = rayon::join(
+        || {
+            let by_nominal = match tables.table {
+                Some(table) => Some(by_table(table)),
+                None => tables.nominal(fitted.or(Some(found))).ok().and_then(|made| by_image(made.image)),
+            };
+            (by_nominal, with_causes.map(|fitted| tables.extended(fitted)))
+        },
+        || calibrated_table(&learnt, prior),
+    );
     // A model that makes no table predicts all the same.
     let by_nominal = by_nominal.unwrap_or_else(|| {
         let left = |(none, series): (&Vec<f64>, &Series)| {
@@ -191,19 +200,15 @@ pub fn evaluate(
         };
         none.iter().zip(&series).map(left).collect()
     });
-    let mut by_extended = None;
-    if let Some(fitted) = fitted.filter(|_| !evaluation.applied.is_empty()) {
-        match tables.extended(fitted).map(|made| made.image) {
-            Ok(image) => by_extended = by_image(image),
-            Err(why) => {
-                evaluation.applied.clear();
-                evaluation.not_made.push(why.to_string());
-            }
+    let by_extended = match extended.transpose() {
+        Ok(made) => made.and_then(|made| by_image(made.image)),
+        Err(why) => {
+            evaluation.applied.clear();
+            evaluation.not_made.push(why.to_string());
+            None
         }
-    }
-    let learnt = sessions.iter().zip(&used).filter(|(_, used)| **used).map(|(session, _)| session.clone());
-    let learnt = measured.with_sessions(learnt.collect());
-    let by_calibrated = match calibrated_table(&[learnt], prior) {
+    };
+    let by_calibrated = match calibrated {
         Ok(made) => by_image(made.image),
         Err(why) => {
             evaluation.not_made.extend(why.to_string().lines().next().map(str::to_owned));
