@@ -48,6 +48,7 @@ pub fn built_in(name: &str) -> Option<Flown> {
             Scenario {
                 acceleration_rad_s2: 0.3,
                 load_kg_m2: 0.3,
+                servo: ServoSettings { speed_hz: 40.0, ..ServoSettings::HHD_95 },
                 ..base(
                     legs(&[
                         (2.0, 0.0),
