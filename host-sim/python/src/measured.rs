@@ -228,7 +228,10 @@ pub fn diagnose<'py>(
                 Subject::of_model(Model::read(path).map_err(PythonFailure::bad)?, drive.clone(), kind)
             }
             KnownFrom::Image(image) => Subject::of_table(image, drive.clone(), kind).map_err(PythonFailure::bad)?,
-            KnownFrom::Ratio(_) => return Err(PythonFailure::bad("expected model or table")),
+            KnownFrom::Ratio(ratio) => {
+                let (name, bytes) = log.bytes().map_err(PythonFailure::bad)?;
+                Subject::of_ratio(*ratio, (drive.clone(), kind), (&name, bytes, &map)).map_err(failed)?
+            }
         };
         let subject = match &kernels {
             Some(path) => with_kernels(subject, path)?,

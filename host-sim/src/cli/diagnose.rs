@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
@@ -24,14 +24,16 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///
 /// Reads a CSV with a generator angle and an output angle (or error_arcsec), if wanted time_s, torque_n_m,
-/// temperature_c and orientation_rad; writes diagnosis.json. The nominal model is a catalogue's (--model) or that of a
-/// table (--tables). Where causes are found it writes drive-extended.toml, to be given again as the input was: with
+/// temperature_c and orientation_rad; writes diagnosis.json. The nominal model is a catalogue's (--model), that of a
+/// table (--tables), or of the ratio alone (--ratio) with wind-up and backlash fitted to the same rows. Where causes are found it writes drive-extended.toml, to be given again as the input was: with
 /// --model in the place of a nominal.toml, or with --drive beside --tables. Of two tables it writes the one that leaves
 /// less error in rows that took no part, if it leaves less than the nominal one and none: that of the causes as
 /// <G>-extended.fxt, that of a calibration of the same rows as calibrated.fxt, each with .json, .rs and .h.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\
 Examples:
+  flexspline diagnose bench.log --ratio 101 --columns generator=#1:turn,output=#2:deg
   flexspline diagnose measured.csv --model nominal.toml
   flexspline diagnose measured.csv --tables out --generator cam
   flexspline diagnose measured.csv --model nominal.toml --explain torsional_hysteresis
@@ -41,12 +43,14 @@ pub(super) struct Diagnose {
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
     /// Nominal model from the catalogue, or one that was extended before: then what is found is beyond it
-    #[arg(long, value_name = "nominal.toml", conflicts_with = "tables")]
-    #[arg(required_unless_present = "tables")]
+    #[arg(long, value_name = "nominal.toml")]
     model: Option<PathBuf>,
     /// Folder of tables made by `flexspline tables` from the drive of --drive
     #[arg(long, value_name = "DIR")]
     tables: Option<PathBuf>,
+    /// Generator turns per output turn, negative if they turn in opposite directions, if nothing else is known
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    ratio: Option<f64>,
     /// Wave generator whose table is used, and that names the extended one: two-roller, four-roller, double-disc or cam
     #[arg(long, value_name = "G", default_value = "cam")]
     generator: GeneratorKind,
@@ -76,9 +80,15 @@ impl Diagnose {
         let explained = causes("--explain", &self.explain)?;
         let without = causes("--without", &self.without)?;
         let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
-        let subject = self.subject(context, image.as_ref())?;
         let failed = |error: PipelineError| self.failed(&error);
         let (file, bytes) = bytes_of(&self.data).map_err(bad_input)?;
+        let subject = match self.ratio {
+            Some(ratio) => {
+                let log = (file.as_str(), bytes.clone(), &map);
+                Subject::of_ratio(ratio, (context.drive()?, self.generator), log).map_err(failed)?
+            }
+            None => self.subject(context, image.as_ref())?,
+        };
         let recording = parse_rows(&file, bytes, &map, &subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
@@ -135,7 +145,7 @@ impl Diagnose {
             return Vec::new();
         }
         let drive = quoted(&out.join("drive-extended.toml").display().to_string());
-        if self.model.is_some() {
+        if self.tables.is_none() {
             return vec![format!("flexspline diagnose NEW.csv --model {drive}")];
         }
         if extension.drive_fields.is_empty() {
@@ -161,7 +171,7 @@ impl Diagnose {
                     None => Ok(subject),
                 }
             }
-            (None, None) => Err(Failure::BadInput("expected --model or --tables".to_owned())),
+            (None, None) => Err(Failure::BadInput("expected --model, --tables or --ratio".to_owned())),
         }
     }
 

@@ -42,6 +42,9 @@ impl Look {
         let Some(columns) = &looked.columns_option else { return Vec::new() };
         let files: Vec<String> = self.files.iter().map(|file| quoted(&file.display().to_string())).collect();
         let ratio = looked.ratio_proposed.map_or("RATIO".to_owned(), |ratio| ratio.to_string());
-        vec![format!("flexspline calibrate {} --ratio {ratio} --columns {}", files.join(" "), quoted(columns))]
+        let with = |command: &str, files: &[String]| {
+            format!("flexspline {command} {} --ratio {ratio} --columns {}", files.join(" "), quoted(columns))
+        };
+        vec![with("calibrate", &files), with("diagnose", &files[..1])]
     }
 }

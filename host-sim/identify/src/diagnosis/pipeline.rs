@@ -25,6 +25,7 @@ use crate::extension::{
     CauseEntry, Evaluation, ExtendedTables, Model, TableKind, TableSubject, causes_to_toml, evaluate, found_geometry,
     less,
 };
+use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, least_and_most, parse,
 };
@@ -132,6 +133,24 @@ impl<'a> Subject<'a> {
     #[must_use]
     pub fn of_model(model: Model, drive: Drive, kind: GeneratorKind) -> Subject<'static> {
         Subject { nominal: model.nominal.clone(), table: None, model: Some(model), drive, kind }
+    }
+
+    /// A drive known by its ratio: wind-up and backlash are those that a calibration of the same rows finds, so that no
+    /// name stands on a guess of them. `bytes` of a log called `file`.
+    ///
+    /// # Errors
+    /// No gear has this ratio; the rows cannot be read, or make no table.
+    pub fn of_ratio(
+        ratio: f64,
+        (drive, kind): (Drive, GeneratorKind),
+        (file, bytes, columns): (&str, Vec<u8>, &ColumnMap),
+    ) -> Result<Subject<'static>, PipelineError> {
+        let prior = Prior::of_given_ratio(ratio, kind)?;
+        let log = parse_known(file, bytes, columns, &prior.nominal, None)?;
+        let made = calibrated_table(&[log], &prior)?;
+        let table = Table::check(&made.image).map_err(PipelineError::Image)?;
+        let nominal = Nominal { ratio, teeth: None, ..Nominal::of_table(&table) };
+        Ok(Subject::of_model(Model { nominal, causes: Vec::new() }, drive, kind))
     }
 
     /// A drive with its table.

@@ -510,6 +510,7 @@ class Diagnosis(Fields):
 def diagnose(
     data: object,
     *,
+    ratio: float | None = None,
     model: PathLike | None = None,
     table: Table | PathLike | bytes | None = None,
     drive: Drive | PathLike = "HHD-95",
@@ -525,7 +526,7 @@ def diagnose(
     """What the simulation gets wrong in measured data, and why: ``flexspline diagnose``.
 
     ``data``: the path of a log, or a table of columns (DataFrame, Arrow table, dict of arrays); columns as for `calibrate`. The nominal model is
-    ``model`` (the path of a nominal.toml or drive-extended.toml) or the ``table`` of ``drive``. ``generator`` is by default the table's, else
+    ``model`` (the path of a nominal.toml or drive-extended.toml), the ``table`` of ``drive``, or a ``ratio`` alone. ``generator`` is by default the table's, else
     ``cam``. ``kernels`` is the path of a .kernels.json of that table; ``explain`` asks about a cause by name.
 
     >>> diagnose("bench.csv", model="nominal.toml").causes  # doctest: +SKIP
@@ -535,7 +536,7 @@ def diagnose(
     with shown(progress, "diagnose") as tell:
         text, drive_toml, parts, explanation, rows = _native.diagnose(
             log(data),
-            _known(None, model, opened),
+            _known(ratio, model, opened),
             drive_of(drive)._inner,
             kind,
             (columns_option(columns), rate_hz, torque_constant),
