@@ -6,6 +6,8 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::rc::Rc;
 
+use rayon::prelude::*;
+
 use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State, columns, weights};
 use crate::linear::{Gram, Prior, solve};
 
@@ -64,16 +66,20 @@ impl Folds {
         begins.push(all.len());
         let folds = rows.iter().map(|row| row.fold + 1).max().unwrap_or(0);
         // One, the columns, and the value.
-        let mut sums = vec![Gram::none(all.len() + 2); folds];
-        let mut x = Vec::with_capacity(all.len() + 2);
-        for row in rows {
-            x.clear();
-            x.push(1.0);
-            x.extend((0..zeros).map(|log| f64::from(log == row.at.log)));
-            parts.iter().for_each(|part| columns(*part, &row.at, scales, &mut x));
-            x.push(row.left_arcsec);
-            sums[row.fold].add_row(&x, 1.0);
-        }
+        let of_fold = |fold: usize| {
+            let mut sum = Gram::none(all.len() + 2);
+            let mut x = Vec::with_capacity(all.len() + 2);
+            for row in rows.iter().filter(|row| row.fold == fold) {
+                x.clear();
+                x.push(1.0);
+                x.extend((0..zeros).map(|log| f64::from(log == row.at.log)));
+                parts.iter().for_each(|part| columns(*part, &row.at, scales, &mut x));
+                x.push(row.left_arcsec);
+                sum.add_row(&x, 1.0);
+            }
+            sum
+        };
+        let mut sums: Vec<Gram> = (0..folds).into_par_iter().map(of_fold).collect();
         let rows = sums.iter().map(|sum| sum.at(0, 0)).collect();
         let columns: Vec<usize> = (1..all.len() + 2).collect();
         sums.iter_mut().for_each(|sum| *sum = if own_zero { sum.first_free() } else { sum.among(&columns) });

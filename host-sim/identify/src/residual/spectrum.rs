@@ -213,6 +213,8 @@ struct Grid<'a> {
     length: usize,
     /// Places of the transform that are looked at.
     places: std::ops::RangeInclusive<usize>,
+    /// What the sharing leaves of each place of the transform: sinc².
+    kept: Vec<f64>,
     /// Transform of ones.
     window: Vec<Complex<f64>>,
 }
@@ -225,7 +227,12 @@ impl<'a> Grid<'a> {
             ((OVERSAMPLING * turns * per_turn).max(turns * per_turn + 2.0) as usize).next_power_of_two().max(64);
         let place = |order: f64| order * length as f64 / per_turn;
         let places = place(lowest).ceil() as usize..=(place(highest) as usize).min(length / 2 - 1);
-        let mut grid = Grid { angle, low, per_turn, length, places, window: Vec::new() };
+        let kept = |place: usize| {
+            let x = PI * place as f64 / length as f64;
+            if place == 0 { 1.0 } else { (x.sin() / x).powi(2) }
+        };
+        let kept = (0..=length / 2).map(kept).collect();
+        let mut grid = Grid { angle, low, per_turn, length, places, kept, window: Vec::new() };
         grid.window = grid.transform(|_| 1.0);
         grid
     }
@@ -246,11 +253,7 @@ impl<'a> Grid<'a> {
             cells[cell + 1] += w * part;
         }
         let mut sums = spectrum(&mut cells);
-        for (place, sum) in sums.iter_mut().enumerate() {
-            let x = PI * place as f64 / self.length as f64;
-            let sinc = if place == 0 { 1.0 } else { x.sin() / x };
-            *sum /= sinc * sinc;
-        }
+        sums.iter_mut().zip(&self.kept).for_each(|(sum, kept)| *sum /= *kept);
         sums
     }
 
@@ -310,14 +313,15 @@ impl Grid<'_> {
         size *= 1.0 + 2.0 * (length / n as f64).min(1.0);
         let white = (whole - size).max(0.0).sqrt();
         let mut random = fastrand::Rng::with_seed(7);
-        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+        // Of unit variance: squares of many rows do not ask for more.
+        let mut any = || 12f64.sqrt() * (random.f64() - 0.5);
         let mut level = vec![0.0; self.places.clone().count()];
         for _ in 0..SURROGATES {
-            let mut slow = size.sqrt() * normal();
+            let mut slow = size.sqrt() * any();
             let surrogate: Vec<f64> = (0..n)
                 .map(|_| {
-                    slow = memory * slow + (size * (1.0 - memory * memory)).sqrt() * normal();
-                    slow + white * normal()
+                    slow = memory * slow + (size * (1.0 - memory * memory)).sqrt() * any();
+                    slow + white * any()
                 })
                 .collect();
             let scan = self.scan(&surrogate);
