@@ -70,7 +70,9 @@ impl Plan<'_> {
         bend
     }
 
-    pub(super) fn row(&self, sample: &Sample, slopes: &Slopes) -> SampleRow {
+    /// The equation of a sample; `kept` has its cosines and sines from the first time on, if there is room for them: NaN
+    /// before.
+    pub(super) fn row(&self, sample: &Sample, slopes: &Slopes, kept: Option<&mut [f64]>) -> SampleRow {
         let generator = GeneratorAngle::from_rad(sample.generator_rad).unwrap_or_default();
         let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
         let mut row = SampleRow {
@@ -92,6 +94,11 @@ impl Plan<'_> {
             nodes.into_iter().zip(weights).map(move |(node, share)| (base + node, weight * share as f64))
         });
         row.ripple.iter_mut().zip(pairs).for_each(|(to, from)| *to = from);
+        let known = kept.as_ref().is_some_and(|kept| kept.first().is_some_and(|value| !value.is_nan()));
+        if let Some(kept) = kept.as_ref().filter(|_| known) {
+            row.harmonics.iter_mut().zip(kept.iter()).for_each(|(to, from)| *to = *from);
+            return row;
+        }
         let parts =
             [(self.generator, phases.generator), (self.material, phases.material), (self.output, phases.output)];
         let angles = parts.iter().flat_map(|(part, phase)| {
@@ -101,6 +108,7 @@ impl Plan<'_> {
             let (sine, cosine) = libm::sincos(angle);
             pair.iter_mut().zip([cosine, sine]).for_each(|(to, from)| *to = from);
         }
+        kept.into_iter().flatten().zip(row.harmonics).for_each(|(to, from)| *to = from);
         row
     }
 }

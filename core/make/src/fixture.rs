@@ -72,7 +72,7 @@ pub fn provenance() -> Provenance<'static> {
 
 /// Buffers large enough for a plan.
 pub struct Buffers {
-    numbers: Vec<f64>,
+    pub numbers: Vec<f64>,
     marks: Vec<u64>,
     values: Vec<f32>,
 }

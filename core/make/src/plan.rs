@@ -124,6 +124,12 @@ impl<'a> Plan<'a> {
         self.unknowns().saturating_mul(5).saturating_add(self.records().saturating_mul(2))
     }
 
+    /// How much longer [`Workspace::numbers`] has to be to keep the cosines and sines of this many samples.
+    #[must_use]
+    pub fn kept_len(&self, samples: usize) -> usize {
+        self.harmonics().saturating_mul(2).saturating_mul(samples)
+    }
+
     /// Length of [`Workspace::marks`].
     #[must_use]
     pub fn marks_len(&self) -> usize {

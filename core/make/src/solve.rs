@@ -25,6 +25,8 @@ pub(super) struct System<'w> {
     pub means: &'w mut [f64],
     /// Sum for each D, before its coefficients share it.
     pub pulls: &'w mut [f64],
+    /// Cosines and sines of as many samples as there is room for.
+    pub kept: &'w mut [f64],
 }
 
 /// Which directions were sampled at a record, from the marks of [`solve`].
@@ -90,15 +92,18 @@ pub(super) fn solve(
     marks: &mut [u64],
     system: System<'_>,
 ) -> Result<(), ProjectError> {
-    let System { diagonal, residual, search, product, means, pulls } = system;
-    let slopes = &Slopes::new(plan.torque_nodes_n_m);
+    let System { diagonal, residual, search, product, means, pulls, kept } = system;
+    let (slopes, width) = (&Slopes::new(plan.torque_nodes_n_m), 2 * plan.harmonics());
+    kept.fill(f64::NAN);
+    let mut row_of =
+        |index: usize, sample: &Sample| plan.row(sample, slopes, kept.get_mut(index * width..(index + 1) * width));
     solution.fill(0.0);
     diagonal.fill(0.0);
     residual.fill(0.0);
     marks.fill(0);
     // The diagonal leaves the bend out: it scales the equations and counts the samples of a coefficient.
-    for (_, sample) in plan.used(samples) {
-        let row = plan.row(sample, slopes);
+    for (index, sample) in plan.used(samples) {
+        let row = row_of(index, sample);
         for_each_entry(plan, &row, |unknown, value| add(diagonal, unknown, value * value));
         let generator = GeneratorAngle::from_rad(sample.generator_rad).unwrap_or_default();
         let tooth = generator.fraction().wrapping_mul(plan.drive.ripple_order() as u32);
@@ -116,8 +121,8 @@ pub(super) fn solve(
     let given = plan.missing_direction.half_width_rad();
     means.iter_mut().enumerate().for_each(|(record, mean)| *mean = given * sampled.shares(record).1);
     pulls.fill(0.0);
-    for (_, sample) in plan.used(samples) {
-        let row = plan.row(sample, slopes);
+    for (index, sample) in plan.used(samples) {
+        let row = row_of(index, sample);
         let wanted = row.error_rad - row.bend.of(means);
         for_each_entry(plan, &row, |unknown, value| add(residual, unknown, value * wanted));
         row.bend.for_each(|record, weight| add(pulls, record, weight * wanted));
@@ -142,8 +147,8 @@ pub(super) fn solve(
         product.fill(0.0);
         pulls.fill(0.0);
         plan.gather_means(sampled, search, means);
-        for (_, sample) in plan.used(samples) {
-            let row = plan.row(sample, slopes);
+        for (index, sample) in plan.used(samples) {
+            let row = row_of(index, sample);
             let mut along = row.bend.of(means);
             for_each_entry(plan, &row, |unknown, value| {
                 along += value * search.get(unknown).copied().unwrap_or(0.0);

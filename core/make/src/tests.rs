@@ -348,3 +348,17 @@ fn plans_and_workspaces_that_do_not_fit_are_refused() {
         assert!(matches!(found, Err(ProjectError::Workspace { part: named, .. }) if named == part), "{found:?}");
     }
 }
+
+/// Room for the cosines and sines of none, some or all of the samples.
+#[test]
+fn what_is_kept_of_the_samples_changes_no_bit() {
+    let (plan, samples) = (fixture::plan(true), fixture::samples(true));
+    let [none, some, all] = [0, samples.len() / 2, samples.len()].map(|kept| {
+        let mut buffers = Buffers::new(&plan);
+        buffers.numbers.resize(plan.numbers_len() + plan.kept_len(kept), 0.5);
+        let mut image = vec![0; plan.image_bytes()];
+        make_image(&plan, &fixture::provenance(), &samples, buffers.workspace(), &mut image, fixture::id).unwrap();
+        image
+    });
+    assert!(plan.kept_len(1) > 0 && none == some && some == all);
+}

@@ -79,7 +79,7 @@ pub fn image(
         deviation_limit_rad: f64::from(Table::MAX_ERROR_RAD),
     };
     let samples = samples(gear, sampling, &torques);
-    let mut numbers = vec![0.0; plan.numbers_len()];
+    let mut numbers = vec![0.0; plan.numbers_len() + plan.kept_len(samples.len())];
     let mut marks = vec![0; plan.marks_len()];
     let mut values = vec![0.0; plan.values_len()];
     let mut image = vec![0; plan.image_bytes()];

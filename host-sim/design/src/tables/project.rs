@@ -273,7 +273,7 @@ fn make(
     mesh: &str,
     residual: f64,
 ) -> Result<MadeTable, TableError> {
-    let mut numbers = vec![0.0; plan.numbers_len()];
+    let mut numbers = vec![0.0; plan.numbers_len() + plan.kept_len(samples.len())];
     let mut marks = vec![0; plan.marks_len()];
     let mut values = vec![0.0; plan.values_len()];
     let mut image = vec![0; plan.image_bytes()];
