@@ -94,7 +94,7 @@ impl Diagnose {
         let out = context.out()?;
         // The data that would separate a cause from the strongest named one are looked for in one log only.
         let asked = explained.first().copied().filter(|_| explained.len() == 1);
-        let options = Settings { verbose: context.verbose(), asked, without: &without, ..Settings::default() };
+        let options = Settings { asked, without: &without, ..Settings::default() };
         let progress = context.progress("diagnose");
         let done = diagnose_rows(recording, &subject, &options, |done, of, what| progress.set(done, of, what))
             .map_err(failed)?;

@@ -91,8 +91,6 @@ pub enum DiagnosisError {
 pub struct Settings<'a> {
     /// Radius of the pitch circle of the output, mm: turns arc-seconds into micrometres.
     pub pitch_radius_mm: f64,
-    /// Says on stderr what is tried.
-    pub verbose: bool,
     /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
     pub asked: Option<CauseName>,
     /// Causes that are not considered: somebody knows that they are not there, or wants to see what the rows say then.
@@ -112,7 +110,7 @@ pub struct Fineness {
 
 impl Default for Settings<'_> {
     fn default() -> Self {
-        Settings { pitch_radius_mm: 48.7, verbose: false, asked: None, without: &[] }
+        Settings { pitch_radius_mm: 48.7, asked: None, without: &[] }
     }
 }
 
@@ -168,13 +166,6 @@ pub(crate) fn diagnose_extended(
     let fast = fast.map(|(label, size)| Unexplained { looks_like: label.to_string(), size_arcsec: *size });
     left.extend(fast.filter(|line| line.size_arcsec > select::least_size(noise.white)));
     left.extend(remainder::beyond_noise(problem, &selected, noise));
-    for (k, term) in selected.terms.iter().enumerate() {
-        let (label, [main, nuisance, beside]) = (term.law.label, select::parts(term, selected.fit.of(k)));
-        trace.say(&format_args!("{label}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2} arcsec"));
-    }
-    for something in &left {
-        trace.say(&format_args!("left: {}, {:.2} arcsec", something.looks_like, something.size_arcsec));
-    }
     let on_sample = search
         .thinned
         .as_ref()
@@ -220,7 +211,7 @@ impl<'a> Search<'a> {
         let mut laws = library(on);
         laws.extend(unnamed(on));
         laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.contains(&cause)));
-        let mut trace = Trace::new(settings.verbose);
+        let mut trace = Trace::default();
         for cause in CauseName::ALL {
             if let Some(need) = on.lacks(cause) {
                 trace.decided(Stage::Data, cause.into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
@@ -254,7 +245,6 @@ impl<'a> Search<'a> {
             if new_line {
                 start.clear();
             }
-            say_noise(&trace, noise, worth);
             let problem = Problem::new(*on, &uncertain, Fineness { stride, noise, worth });
             let thinned = Thinned::of(on, stride);
             let mut scope = Scope::Everything;
@@ -270,10 +260,8 @@ impl<'a> Search<'a> {
                 for line in remainder::lines(&problem, &selected, noise) {
                     let (label, size_arcsec) = (Label::Line { per: line.per, order: line.order }, line.size_arcsec);
                     if remainder::averaged_away(&problem, &line) {
-                        trace.say(&format_args!("{label}: {size_arcsec:.2} arcsec, too fast for averages"));
                         fast.push((label, size_arcsec));
                     } else if laws.iter().all(|law| law.label != label) {
-                        trace.say(&format_args!("{label}: {size_arcsec:.2} arcsec"));
                         slow.push(line);
                     }
                 }
@@ -316,13 +304,6 @@ fn choose<'l>(
     let selected = chooser.select(terms_at(problem, laws, start)).ok_or(DiagnosisError::NotFinite)?;
     *start = remembered(laws, &selected.terms);
     Ok(selected)
-}
-
-/// Says which noise was found, and the information weight of the rows under it.
-fn say_noise(trace: &Trace, Noise { white, wander, correlation_s }: Noise, weight: f64) {
-    trace.say(&format_args!(
-        "noise: white {white:.3}, drift {wander:.3} arcsec over {correlation_s:.1} s; information weight {weight:.2}"
-    ));
 }
 
 /// Which laws were selected, and where.

@@ -399,7 +399,7 @@ fn a_search_on_a_sample_comes_to_what_one_on_all_rows_comes_to() {
         let (search, _) = super::Search::new(on, &Settings::default()).unwrap();
         assert!(search.thinned.as_ref().unwrap().share < 0.4);
         let problem = &search.problem;
-        let (mut bests, mut trace) = (super::Bests::default(), super::Trace::new(false));
+        let (mut bests, mut trace) = (super::Bests::default(), super::Trace::default());
         let everything = super::Scope::Everything;
         let on_all =
             super::choose(problem, &search.laws, &mut Vec::new(), (&mut bests, everything, &mut trace)).unwrap();

@@ -1,12 +1,8 @@
 //! Every decision of a diagnosis: which law was judged, at which stage, by which gates, with which values and limits.
 //!
 //! The verdict alone does not say why a cause was *not* named. The trace does: of each cause it knows how far it came,
-//! and the gate that stopped it. What `-v` prints, what `diagnosis.json` has under `trace`, what the report shows and
-//! what `--explain` says are all made from it. What is collected are numbers that the search has in hand anyway, some
-//! hundred of them.
-
-use std::fmt;
-use std::io::Write as _;
+//! and the gate that stopped it. What `diagnosis.json` has under `trace`, what the report shows and what `--explain`
+//! says are all made from it. What is collected are numbers that the search has in hand anyway, some hundred of them.
 
 use serde::Serialize;
 use serde::ser::Serializer;
@@ -187,17 +183,9 @@ impl Decision {
 pub struct Trace {
     steps: Vec<Decision>,
     round: usize,
-    /// Says on stderr what comes.
-    aloud: bool,
 }
 
 impl Trace {
-    /// An empty one; `aloud` if it is said on stderr as it comes.
-    #[must_use]
-    pub fn new(aloud: bool) -> Trace {
-        Trace { aloud, ..Trace::default() }
-    }
-
     /// Another round of the search begins.
     pub(super) fn next_round(&mut self) {
         self.round += 1;
@@ -205,16 +193,7 @@ impl Trace {
 
     /// A decision on a law or a cause, held against another where there is one.
     pub(super) fn decided(&mut self, stage: Stage, label: Label, against: Option<Label>, gates: Vec<Judged>) {
-        let step = Decision { label, stage, round: self.round, against, gates };
-        self.say(&serde_json::to_string(&TraceEntries(vec![&step])).unwrap_or_default());
-        self.steps.push(step);
-    }
-
-    /// Says what was found to who listens; a reader that has gone is no reason to fail.
-    pub(super) fn say(&self, what: &impl fmt::Display) {
-        if self.aloud {
-            let _ = writeln!(std::io::stderr(), "{what}");
-        }
+        self.steps.push(Decision { label, stage, round: self.round, against, gates });
     }
 
     /// Decisions on a cause, in their order.
