@@ -59,6 +59,15 @@ pub struct Harmonics<'a> {
     pub nodes: usize,
 }
 
+impl<'a> Harmonics<'a> {
+    /// These orders, on as few nodes as they need.
+    #[must_use]
+    pub fn of(orders: &'a [u16]) -> Self {
+        let highest = orders.iter().fold(0, |highest, order| usize::from(*order).max(highest));
+        Self { orders, nodes: highest.saturating_mul(NODES_PER_PERIOD) }
+    }
+}
+
 /// Specification of the table to make of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan<'a> {

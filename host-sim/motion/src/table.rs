@@ -4,9 +4,7 @@
 use core::f64::consts::TAU;
 
 use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, Table};
-use flexspline_make::{
-    Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, ProjectError, Provenance, Sample, Workspace, make_image,
-};
+use flexspline_make::{Harmonics, MissingDirection, Plan, ProjectError, Provenance, Sample, Workspace, make_image};
 
 use super::gear::{Gear, GearLine, SampledSpring, Spring};
 use super::noise::NoiseSource;
@@ -58,14 +56,7 @@ pub fn image(
 ) -> Result<Vec<u8>, ProjectError> {
     let torques = torques(sampling);
     let temperatures = [sampling.temperature_c as f32];
-    let curve = |orders: &'static [u16]| {
-        let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
-        if gear.lines.is_empty() {
-            Harmonics::default()
-        } else {
-            Harmonics { orders, nodes: NODES_PER_PERIOD * highest }
-        }
-    };
+    let curve = |orders: &'static [u16]| Harmonics::of(if gear.lines.is_empty() { &[] } else { orders });
     let plan = Plan {
         drive,
         torque_nodes_n_m: &torques,

@@ -189,7 +189,7 @@ pub(super) fn trial_table(
 /// Plan of the projection of a table of FEM samples.
 fn fem_plan<'a>(drive: &Drive, plan: &'a SweepPlan) -> Result<Plan<'a>, TableError> {
     let repeats = drive.as_built.first_not_uniform().is_none();
-    let harmonics = |orders| if repeats { Harmonics::default() } else { harmonics_of(orders) };
+    let harmonics = |orders| Harmonics::of(if repeats { &[] } else { orders });
     Ok(Plan {
         drive: core_drive(drive)?,
         torque_nodes_n_m: &plan.torque_nodes_n_m,
@@ -202,12 +202,6 @@ fn fem_plan<'a>(drive: &Drive, plan: &'a SweepPlan) -> Result<Plan<'a>, TableErr
         negative_half_width_tolerance_rad: if repeats { HALF_WIDTH_NOISE_RAD } else { AS_BUILT_DEVIATION_RAD },
         deviation_limit_rad: if repeats { FEM_DEVIATION_RAD } else { AS_BUILT_DEVIATION_RAD },
     })
-}
-
-/// Orders, on as many nodes as the highest needs.
-fn harmonics_of(orders: &'static [u16]) -> Harmonics<'static> {
-    let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
-    Harmonics { orders, nodes: flexspline_make::NODES_PER_PERIOD * highest }
 }
 
 /// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many
@@ -233,7 +227,7 @@ pub fn from_samples(
         .collect();
     let (least, most) = least_and_most(snapped.iter().map(|s| s.generator_rad));
     let long = (most - least) / std::f64::consts::TAU >= OUTPUT_TURNS_FOR_HARMONICS * drive.ratio().abs();
-    let harmonics = |orders| if long { harmonics_of(orders) } else { Harmonics::default() };
+    let harmonics = |orders| Harmonics::of(if long { orders } else { &[] });
     let plan = Plan {
         drive: core_drive(drive)?,
         torque_nodes_n_m: &torques,

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use flexspline::{Direction, GeneratorAngle, Table};
 use flexspline_make::grid::{MAX_CLAMPED_NODES, jump_intervals};
-use flexspline_make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
+use flexspline_make::{Harmonics, MissingDirection, Plan, Sample};
 
 use super::parts::{GENERATOR_ORDERS, OUTPUT_ORDERS, PartName, State, TOOTH_ORDERS};
 use super::prior::Prior;
@@ -44,10 +44,7 @@ pub(super) fn make(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Res
     let drive = prior.core_drive()?;
     let temperatures = temperature_nodes(prior, recorded);
     let has = |part| model.chosen.iter().any(|chosen| chosen.part == part);
-    let curve = |there: bool, orders: &'static [u16]| {
-        let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
-        if there { Harmonics { orders, nodes: NODES_PER_PERIOD * highest } } else { Harmonics::default() }
-    };
+    let curve = |there: bool, orders: &'static [u16]| Harmonics::of(if there { orders } else { &[] });
     let from_table = prior.table.is_some();
     let waves = from_table || !prior.nominal.harmonics.is_empty();
     let ripple = has(PartName::ToothPitch) || from_table;

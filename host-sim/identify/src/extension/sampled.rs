@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use flexspline::{Direction, Table};
-use flexspline_make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
+use flexspline_make::{Harmonics, MissingDirection, Plan, Sample};
 
 use super::model::Model;
 use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER};
@@ -179,18 +179,14 @@ impl ExtendedTables<'_> {
         let (torques, temperatures) = self.axes();
         let drive = self.table.map_or_else(|| self.nominal.core_drive(), |table| Ok(*table.drive()))?;
         let samples = self.sample(predicted, &torques, &temperatures)?;
-        let curve = |orders: &'static [u16]| {
-            let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
-            Harmonics { orders, nodes: NODES_PER_PERIOD * highest }
-        };
         let plan = Plan {
             drive,
             torque_nodes_n_m: &torques,
             temperature_nodes_c: &temperatures,
             ripple_nodes: RIPPLE_NODES,
-            generator: curve(&ORDERS),
-            material: curve(&ORDERS),
-            output: curve(&OUTPUT_ORDERS),
+            generator: Harmonics::of(&ORDERS),
+            material: Harmonics::of(&ORDERS),
+            output: Harmonics::of(&OUTPUT_ORDERS),
             missing_direction: MissingDirection::Refuse,
             negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
             deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
