@@ -337,10 +337,11 @@ pub fn replay(
             }
         })
         .collect();
-    read_torques(table, rows, &mut replayed, wind_up);
+    let residuals: Vec<f64> = replayed.iter().map(|row| row.residual_arcsec).collect();
+    let mean_residual_arcsec = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
+    let off: Vec<f64> = residuals.iter().map(|residual| (residual - mean_residual_arcsec).abs()).collect();
+    read_torques(table, rows, (&mut replayed, &off), wind_up);
     let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
-    let count = replayed.len().max(1) as f64;
-    let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
     let found = Misfit::of(table, rows);
     let mut summary = ReplaySummary {
         schema_version: 1,
@@ -349,10 +350,8 @@ pub fn replay(
         rows: replayed.len(),
         rms_measured_arcsec: about(|row| row.measured_arcsec),
         rms_residual_arcsec: about(|row| row.residual_arcsec),
-        max_residual_arcsec: replayed
-            .iter()
-            .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
-        mean_residual_arcsec: mean_residual,
+        max_residual_arcsec: off.iter().copied().fold(0.0, f64::max),
+        mean_residual_arcsec,
         rows_by_quality: by_quality,
         generator_zero_off: found.turns_off(),
         torque_turned_rms_arcsec: found.torque_turned(),
@@ -373,14 +372,13 @@ pub fn replay(
 fn read_torques(
     table: &Table<'_>,
     rows: &[MeasuredRow],
-    replayed: &mut [ReplayedRow],
+    (replayed, off_arcsec): (&mut [ReplayedRow], &[f64]),
     calibrated: Option<WindUpTorque>,
 ) {
     let half_width_arcsec = if let Some(calibrated) = &calibrated {
         calibrated.half_width_arcsec
     } else if rows.iter().any(|row| row.torque_n_m != 0.0) {
-        let zero = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / replayed.len().max(1) as f64;
-        quantile_of(&mut replayed.iter().map(|row| (row.residual_arcsec - zero).abs()).collect::<Vec<f64>>(), INSIDE)
+        quantile_of(&mut off_arcsec.to_vec(), INSIDE)
     } else {
         let errors: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
         OF_95 * white_noise([&errors[..]]).hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)

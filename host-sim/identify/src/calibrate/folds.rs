@@ -21,6 +21,8 @@ pub(super) struct Row {
     pub left_arcsec: f64,
     /// Which fold it belongs to.
     pub fold: usize,
+    /// Its place among the loads of all rows that were looked at.
+    pub number: usize,
 }
 
 /// A part with its penalty.

@@ -39,6 +39,8 @@ pub(super) enum FoldKind {
 #[derive(Clone)]
 pub(super) struct Rows {
     pub rows: Vec<Row>,
+    /// Session and load, N·m, of each row that was looked at, the unsettled ones among them.
+    pub loads: Vec<(usize, f64)>,
     /// Means taken off the measured error and off the residual of each file, arcsec.
     measured_means_arcsec: Vec<f64>,
     pub means_arcsec: Vec<f64>,
@@ -243,38 +245,42 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     let every = one_in(total);
     let mut all = Rows {
         rows: Vec::new(),
+        loads: Vec::new(),
         measured_means_arcsec: Vec::new(),
         means_arcsec: Vec::new(),
         folds: FoldKind::Blocks,
         of: total,
         unsettled: 0,
     };
+    let mut sessions = 0..;
     for (zero, file) in files.iter().enumerate() {
         let begin = all.rows.len();
-        for session in &file.sessions {
+        for (session, number) in file.sessions.iter().zip(sessions.by_ref()) {
             let settle_rad = SETTLED * play_rad * prior.nominal.ratio.abs();
             let mut ways = directions(session, prior.nominal.ratio, recorded.step_rad, settle_rad);
             held_by_load(&mut ways, session, recorded.scales.friction_n_m, settle_rad);
             let speeds = speeds_rad_s(session, prior.nominal.ratio);
             let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
             for k in thinned {
+                let at = |column: &Option<Vec<f64>>, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
+                let torque_n_m = if recorded.has_torque { at(&session.torque_n_m, 0.0) } else { 0.0 };
+                all.loads.push((number, torque_n_m));
                 let Some(way) = ways[k] else {
                     all.unsettled += 1;
                     continue;
                 };
-                let at = |column: &Option<Vec<f64>>, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
                 let generator_rad = session.generator_rad[k];
                 let at = State {
                     generator_rad,
                     output_rad: generator_rad / prior.nominal.ratio,
-                    torque_n_m: if recorded.has_torque { at(&session.torque_n_m, 0.0) } else { 0.0 },
+                    torque_n_m,
                     temperature_c: at(&session.temperature_c, recorded.temperature_c),
                     way,
                     speed_rad_s: speeds[k],
                     log: zero,
                 };
                 let measured_arcsec = session.error_rad[k] * ARCSEC_PER_RAD;
-                all.rows.push(Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0 });
+                all.rows.push(Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0, number: all.loads.len() - 1 });
             }
         }
         // Zeros of encoders are large numbers that squares do not like.
@@ -345,8 +351,7 @@ impl Rows {
     /// Those of some logs.
     pub(crate) fn of_logs(&self, logs: [usize; 2]) -> Rows {
         let rows = self.rows.iter().filter(|row| logs.contains(&row.at.log)).copied().collect();
-        let (measured_means_arcsec, means_arcsec) = (self.measured_means_arcsec.clone(), self.means_arcsec.clone());
-        Rows { rows, measured_means_arcsec, means_arcsec, ..*self }
+        Rows { rows, ..self.clone() }
     }
 
     /// With blocks of each log for folds: what is a log's own is not seen in the others.

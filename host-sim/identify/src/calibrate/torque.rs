@@ -7,10 +7,10 @@ use flexspline::Table;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::folds::{Folds, Row};
+use super::folds::Folds;
 use super::parts::State;
 use super::prior::Prior;
-use super::rows::{FoldKind, Rows};
+use super::rows::Rows;
 use super::{LEAST_GAIN, Model, ROUNDING_ARCSEC};
 use crate::linear::{self, Gram, solve};
 use crate::measurement::{Recording, quantile_of};
@@ -26,8 +26,10 @@ pub(crate) const INSIDE: f64 = 0.95;
 /// Torques at which springs slip, of the largest recorded: each twice the one before, up to half, as a loop of a spring
 /// that slips later is not closed. *Guess*.
 const SLIPS: [f64; 5] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
-/// What a spring holds at most before rows say anything, arcsec: far beyond any, so that rows decide. *Guess*.
+/// Zero of a session, and way of a spring per N·m, before rows say anything, arcsec: far beyond any. *Guess*.
 const ANY_ARCSEC: f64 = 1e4;
+/// Weight of a row left out: a session that has no others takes its zero from them. *Guess*.
+const LEFT_OUT: f64 = 1e-6;
 
 /// Torque from the wind-up against that recorded, rows in steady motion, each by a fit without its fold.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,58 +53,54 @@ pub struct WindUpTorque {
 /// A number for each spring.
 type Held = [f64; SLIPS.len()];
 
-/// A fit to all folds but one: zeros of the logs, the model, and what goes in addition.
+/// A fit to all folds but one: zeros of the sessions, arcsec, the model, and what it does not have.
 type FitWithout = (Vec<f64>, Model, Hysteresis);
 
-/// What the springs hold in each row by the torque recorded, over what each can.
-fn held_by(rows: &[Row], widths_n_m: Held) -> Vec<Held> {
-    let (mut held, mut log) = (HeldTorques::default(), 0);
-    let of_row = |row: &Row| {
-        if row.at.log != log {
-            (held, log) = (HeldTorques::default(), row.at.log);
-        }
-        held.follow(row.at.torque_n_m, widths_n_m);
-        std::array::from_fn(|k| held.by_spring[k] / widths_n_m[k])
+/// What the springs hold in each row by the torque recorded, N·m.
+fn held_by(loads: &[(usize, f64)], widths_n_m: Held) -> Vec<Held> {
+    let mut held = HeldTorques::default();
+    let of_row = |(session, torque_n_m): &(usize, f64)| {
+        held.begin(*session);
+        held.follow(*torque_n_m, widths_n_m);
+        std::array::from_fn(|k| held.by_spring[k])
     };
-    rows.iter().map(of_row).collect()
+    loads.iter().map(of_row).collect()
 }
 
-/// Hysteresis in what a model leaves of some rows, each log with a zero of its own. The output lags: a spring with
-/// which it would lead gets nothing.
+/// Zeros of the sessions and hysteresis in what a model leaves of some rows, all but those of a fold: by so many of the
+/// springs, those that slip last, of which the last never does. The output lags: a spring with which it would lead gets
+/// nothing.
 fn hysteresis_in(
-    rows: &[Row],
-    held: &[Held],
-    widths_n_m: Held,
-    left: impl Fn(&Row) -> Option<f64>,
-) -> Option<Hysteresis> {
+    (rows, held, widths_n_m): (&Rows, &[Held], Held),
+    (fold, model): &(Option<usize>, Model),
+    springs: usize,
+) -> Option<FitWithout> {
     const SPRINGS: usize = SLIPS.len();
-    let logs = rows.iter().map(|row| row.at.log + 1).max()?;
-    let most_n_m = widths_n_m[SPRINGS - 1] / SLIPS[SPRINGS - 1];
-    let mut gram = Gram::none(logs + SPRINGS + 2);
+    let sessions = rows.loads.last().map_or(0, |(session, _)| session + 1);
+    let mut gram = Gram::none(sessions + SPRINGS + 2);
     let mut x = vec![0.0; gram.size];
-    for (row, held) in rows.iter().zip(held) {
-        let Some(left) = left(row) else { continue };
-        x[..logs].fill(0.0);
-        x[row.at.log] = 1.0;
-        x[logs] = row.at.torque_n_m / most_n_m;
-        x[logs + 1..][..SPRINGS].copy_from_slice(held);
-        x[logs + 1 + SPRINGS] = left;
-        gram.add_row(&x, 1.0);
+    for row in &rows.rows {
+        x[..sessions].fill(0.0);
+        x[rows.loads[row.number].0] = 1.0;
+        x[sessions..][..SPRINGS].copy_from_slice(&held[row.number]);
+        x[sessions + SPRINGS..].copy_from_slice(&[row.at.torque_n_m, row.left_arcsec - model.adds_arcsec(&row.at)]);
+        gram.add_row(&x, if Some(row.fold) == *fold { LEFT_OUT } else { 1.0 });
     }
     let gram = gram.among(&(0..gram.size).collect::<Vec<usize>>());
     let mut priors = vec![linear::Prior { mean: 0.0, std: ANY_ARCSEC }; gram.size - 1];
-    let gain = |arcsec: f64, n_m: f64| arcsec / ARCSEC_PER_RAD / n_m;
+    priors[sessions..][..SPRINGS + 1 - springs].iter_mut().for_each(|prior| prior.std = 0.0);
     loop {
-        let found = solve(&gram, &priors, 1.0)?.coefficients;
-        let leads = (logs + 1..found.len()).filter(|k| priors[*k].std > 0.0 && found[*k] > 0.0);
-        if let Some(most) = leads.max_by(|a, b| found[*a].total_cmp(&found[*b])) {
+        let mut zeros = solve(&gram, &priors, 1.0)?.coefficients;
+        let leads = (sessions..sessions + SPRINGS).filter(|k| priors[*k].std > 0.0 && zeros[*k] > 0.0);
+        if let Some(most) = leads.max_by(|a, b| zeros[*a].total_cmp(&zeros[*b])) {
             priors[most].std = 0.0;
             continue;
         }
-        let springs = widths_n_m.iter().zip(&found[logs + 1..]);
-        let springs =
-            springs.map(|(of, arcsec)| SlipSpring { width_n_m: *of, gain_rad_per_n_m: gain(*arcsec, *of).min(0.0) });
-        return Some(Hysteresis { gain_rad_per_n_m: gain(found[logs], most_n_m), springs: springs.collect() });
+        let gains: Vec<f64> = zeros.split_off(sessions).iter().map(|arcsec| arcsec / ARCSEC_PER_RAD).collect();
+        let springs = widths_n_m.into_iter().zip(&gains);
+        let springs = springs.map(|(width_n_m, gain)| SlipSpring { width_n_m, gain_rad_per_n_m: gain.min(0.0) });
+        let hysteresis = Hysteresis { springs: springs.collect(), gain_rad_per_n_m: gains[SPRINGS] };
+        return Some((zeros, model.clone(), hysteresis));
     }
 }
 
@@ -118,34 +116,37 @@ impl WindUpTorque {
 
     /// None where the output does not give way to the load.
     pub(super) fn of(rows: &Rows, folds: &Folds, model: &Model, prior: &Prior<'_>) -> Option<Self> {
-        let range @ [low, high] = model.scales.torque_n_m;
-        if model.under_arcsec(high, prior) <= model.under_arcsec(low, prior) {
+        let [low, high] = model.scales.torque_n_m;
+        let per_n_m = (model.under_arcsec(high, prior) - model.under_arcsec(low, prior)) / (high - low);
+        if per_n_m.is_nan() || per_n_m <= 0.0 {
             return None;
         }
         let all = folds.all();
         let widths_n_m = SLIPS.map(|share| share * low.abs().max(high.abs()));
-        let held = held_by(&rows.rows, widths_n_m);
-        let fit_without = |fold: Option<usize>, springs: bool| -> Option<FitWithout> {
+        let held = held_by(&rows.loads, widths_n_m);
+        let with = (rows, &held[..], widths_n_m);
+        let without = |fold: Option<usize>| {
             let others: Vec<usize> = all.iter().copied().filter(|other| Some(*other) != fold).collect();
             let mut zeros = folds.fit(&others, &model.chosen, &[])?;
             let coefficients = zeros.split_off(zeros.len() - model.coefficients.len());
-            let model = Model { coefficients, ..model.clone() };
-            let left = |row: &Row| (Some(row.fold) != fold).then(|| row.left_arcsec - model.adds_arcsec(&row.at));
-            let hysteresis =
-                if springs { hysteresis_in(&rows.rows, &held, widths_n_m, left)? } else { Hysteresis::default() };
-            Some((zeros, model, hysteresis))
+            Some((fold, Model { coefficients, ..model.clone() }))
         };
-        let judged = |springs: bool| {
-            let fits = (0..=*all.last()?).map(|fold| fit_without(Some(fold), springs)).collect::<Option<Vec<_>>>()?;
-            Some(Self::judged(rows, &held, &fits, range, prior))
+        let models = (0..=*all.last()?).map(|fold| without(Some(fold))).collect::<Option<Vec<_>>>()?;
+        let judged = |springs: usize, half_width_arcsec: f64| {
+            let fits = models.iter().map(|of| hysteresis_in(with, of, springs)).collect::<Option<Vec<_>>>()?;
+            Some((springs, Self::judged(rows, &fits, half_width_arcsec / per_n_m, prior)))
         };
-        let without = judged(false)?;
-        let gains = |with: &Self| with.rms_n_m.powi(2) < (1.0 - LEAST_GAIN) * without.rms_n_m.powi(2);
-        let Some(with) = judged(true).filter(gains) else { return Some(without) };
-        let (.., mut hysteresis) = fit_without(None, true)?;
+        let (_, alone) = judged(0, 0.0)?;
+        let tried = (1..=SLIPS.len() + 1).filter_map(|springs| judged(springs, alone.half_width_arcsec));
+        let (springs, best) = tried.min_by(|(_, a), (_, b)| a.rms_n_m.total_cmp(&b.rms_n_m))?;
+        let (_, best) = judged(springs, best.half_width_arcsec)?;
+        if best.rms_n_m.powi(2) >= (1.0 - LEAST_GAIN) * alone.rms_n_m.powi(2) {
+            return Some(alone);
+        }
+        let (.., mut hysteresis) = hysteresis_in(with, &without(None)?, springs)?;
         let holds_arcsec = |of: &SlipSpring| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD;
         hysteresis.springs.retain(|spring| holds_arcsec(spring) > ROUNDING_ARCSEC);
-        Some(Self { hysteresis: Some(hysteresis), ..with })
+        Some(Self { hysteresis: Some(hysteresis), ..best })
     }
 
     /// With intervals wide enough for all rows as they are read by a table: those inside the play, and after a reversal
@@ -153,47 +154,32 @@ impl WindUpTorque {
     pub(super) fn over_all(self, files: &[Recording], table: &Table<'_>, temperature_c: f64) -> Self {
         let rows: Vec<_> = measured_rows(files.iter().flat_map(|file| &file.sessions), temperature_c).collect();
         let hysteresis = self.hysteresis.clone().unwrap_or_default();
-        let needs = along(table, &rows, &hysteresis, |curve, row, error_rad| curve.needs(row, error_rad)[1]);
-        let mut needs: Vec<f64> = needs.into_iter().filter(|needs| needs.is_finite()).collect();
+        let half_rad = self.half_width_arcsec / ARCSEC_PER_RAD;
+        let mut needs = along(table, &rows, &hysteresis, |curve, row, error| curve.needs(row, error, half_rad));
         let of_all_arcsec = quantile_of(&mut needs, INSIDE) * ARCSEC_PER_RAD;
         Self { half_width_arcsec: self.half_width_arcsec.max(of_all_arcsec), ..self }
     }
 
-    /// Of fits, each without the fold of its place, in the order of the rows: springs go by the torques found.
-    fn judged(rows: &Rows, held: &[Held], fits: &[FitWithout], range: [f64; 2], prior: &Prior<'_>) -> Self {
-        // A log that was left out whole has its zero from nowhere else.
-        let own_zero = |log: usize| {
-            let of_log = rows.rows.iter().zip(held).filter(|(row, _)| row.at.log == log);
-            let left = of_log.map(|(row, held)| {
-                let (_, model, hysteresis) = &fits[row.fold];
-                let springs = hysteresis.springs.iter().zip(held);
-                let springs = springs.map(|(of, share)| of.gain_rad_per_n_m * of.width_n_m * share).sum::<f64>();
-                let of_load = hysteresis.gain_rad_per_n_m * row.at.torque_n_m + springs;
-                row.left_arcsec - model.adds_arcsec(&row.at) - ARCSEC_PER_RAD * of_load
-            });
-            mean(&left.collect::<Vec<f64>>())
-        };
-        let own_zeros: Vec<f64> = match rows.folds {
-            FoldKind::Files => (0..rows.means_arcsec.len()).map(own_zero).collect(),
-            FoldKind::Blocks => Vec::new(),
-        };
+    /// Of fits, each without the fold of its place. Springs go by torques found, by those recorded between flanks.
+    fn judged(rows: &Rows, fits: &[FitWithout], half_width_n_m: f64, prior: &Prior<'_>) -> Self {
         let (mut off, mut left) = (Vec::new(), Vec::new());
-        let (mut now, mut log) = (HeldTorques::default(), 0);
-        for row in &rows.rows {
-            if row.at.log != log {
-                (now, log) = (HeldTorques::default(), row.at.log);
+        let mut now = HeldTorques { half_width_n_m, ..HeldTorques::default() };
+        let mut settled = rows.rows.iter().peekable();
+        for (number, (session, known_n_m)) in rows.loads.iter().enumerate() {
+            now.begin(*session);
+            let (mut torque, mut fold) = (*known_n_m, 0);
+            if let Some(row) = settled.next_if(|row| row.number == number) {
+                let (zeros, model, hysteresis) = &fits[row.fold];
+                let says = |torque_n_m: f64| {
+                    model.says_arcsec(&State { torque_n_m, ..row.at }, prior)
+                        + ARCSEC_PER_RAD * hysteresis.error_rad(&now, torque_n_m)
+                };
+                let error = prior.steady_arcsec(&row.at) + row.left_arcsec - zeros[*session];
+                (torque, fold) = (load_of(says, model.scales.torque_n_m, error), row.fold);
+                off.push(torque - known_n_m);
+                left.push((fold, (error - says(*known_n_m)).abs()));
             }
-            let (zeros, model, hysteresis) = &fits[row.fold];
-            let says = |torque_n_m: f64| {
-                model.says_arcsec(&State { torque_n_m, ..row.at }, prior)
-                    + ARCSEC_PER_RAD * hysteresis.error_rad(&now, torque_n_m)
-            };
-            let zero = own_zeros.get(log).unwrap_or_else(|| &zeros[log]);
-            let error = prior.steady_arcsec(&row.at) + row.left_arcsec - zero;
-            let torque = load_of(says, range, error);
-            off.push(torque - row.at.torque_n_m);
-            left.push((row.fold, (error - says(row.at.torque_n_m)).abs()));
-            now.follow(torque, hysteresis.springs.iter().map(|spring| spring.width_n_m));
+            now.follow(torque, fits[fold].2.springs.iter().map(|spring| spring.width_n_m));
         }
         let half_width = |fold: usize| {
             let others = left.iter().filter(|(other, _)| *other != fold);
