@@ -335,9 +335,9 @@ pub(crate) fn parse_at_least(
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
-    let in_doubt = faults::steps::check(&mut sessions, gear, &mut findings);
-    // Steps that stay in the data look like drift; what may be one between two sessions may be drift as well.
-    if !in_doubt && findings.tooth_steps.is_empty() && !drifts {
+    faults::steps::check(&mut sessions, gear, &mut findings);
+    // Steps that stay in the data look like drift.
+    if findings.tooth_steps.is_empty() && !drifts {
         faults::drift::check(&mut sessions, gear, &mut findings);
     }
     let Findings { mut faults, tooth_steps, notes } = findings;
