@@ -26,7 +26,7 @@ use column::Facts;
 pub(crate) use coverage::Coverage;
 use pair::pair;
 pub use picture::text;
-use relation::torque_says;
+use relation::{CLEAR, torque_says};
 use turns::{proposed_ratio, units_of_counts};
 use words::NameMeaning;
 
@@ -289,11 +289,6 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
     let proposed = ratio.map(proposed_ratio);
     let error = error_rad(&guesses, proposed);
     torque(&mut guesses, error.as_deref(), &mut notes);
-    if let Some(half) = proposed.filter(|ratio| ratio.fract() != 0.0) {
-        notes.push(format!(
-            "ratios are whole numbers but for wheels with an odd number of teeth: {half} is nearest to these rows"
-        ));
-    }
     ask_for_units(&mut guesses, &mut notes);
     let mut columns_option = option(&guesses, &mut notes);
     // From here on the rows are those that `calibrate` and `diagnose` have by this mapping.
@@ -327,7 +322,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
         rivals,
         ratio_found: ratio,
         ratio_proposed: proposed,
-        sessions: read.iter().map(ReadRows::sessions).sum(),
+        sessions: read.iter().map(|rows| rows.log.sessions().count().max(1)).sum(),
         time,
         period_s,
         coverage: coverage::of(&read),
@@ -525,7 +520,7 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
             error.zip(output.as_deref()).and_then(|(error, o)| torque_says(error, o, &guess.values, &guess.of_file));
         let share = says.map_or(0.0, |says| says.share);
         match says {
-            Some(says) if says.is_clear() => {
+            Some(says) if says.share > CLEAR => {
                 guess.negative = says.slope < 0.0;
                 let way = if guess.negative { "against" } else { "with" };
                 let share = 100.0 * share;

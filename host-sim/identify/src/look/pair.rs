@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::relation::slope;
+use super::relation::{TOGETHER, slope};
 use super::turns::{Units, on_one_shaft, settle, units_of_pair};
 use super::{Guess, Rival, Role};
 use crate::measurement::{Family, Unit, least_and_most};
@@ -100,9 +100,6 @@ pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f6
             o + 1
         ));
     }
-    if let Some(more) = rivals.len().checked_sub(SAID).filter(|more| *more > 0) {
-        notes.push(format!("{more} more pairs of columns may be generator and output: --json lists them"));
-    }
     (units.ratio, rivals)
 }
 
@@ -132,7 +129,9 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
             if generator == output || against || one_joint == Some(false) && shafts(g) && shafts(o) {
                 continue;
             }
-            let Some(line) = slope(&o.values, &g.values, &g.of_file).filter(|line| line.holds()) else { continue };
+            let Some(line) = slope(&o.values, &g.values, &g.of_file).filter(|line| line.left < TOGETHER) else {
+                continue;
+            };
             let Some(units) = units_of_pair(g, o, 1.0 / line.slope) else { continue };
             let yes = |is: bool| f64::from(u8::from(is));
             let named = |guess: &Guess| 2.0 * yes(shafts(guess)) + yes(guess.said.angle);

@@ -8,7 +8,7 @@ use crate::measurement::{LineFit, least_and_most, rms};
 /// Rows that a relation is found on, at most.
 const LOOKED_AT: usize = 4000;
 /// Two columns turn together if what a straight line leaves is below this share of the range of the second.
-const TOGETHER: f64 = 5e-3;
+pub(super) const TOGETHER: f64 = 5e-3;
 /// Counts of a turn are a power of two to this: one encoder against another on the same shaft, eccentric by an
 /// arc-minute.
 const SAME_COUNT: f64 = 1e-4;
@@ -17,7 +17,7 @@ const COUNTS_OF_A_TURN: std::ops::RangeInclusive<f64> = 64.0..=4_294_967_296.0;
 /// Ratios of strain wave gears, and a little more.
 pub(super) const RATIOS: [f64; 2] = [20.0, 400.0];
 /// A torque is believed to turn the error one way if it explains this share of what the turn of the output leaves.
-const CLEAR: f64 = 0.05;
+pub(super) const CLEAR: f64 = 0.05;
 
 /// Rows in which all columns have a number, thinned.
 fn rows<const N: usize>(columns: [&[f64]; N]) -> Vec<[f64; N]> {
@@ -56,13 +56,6 @@ pub(super) fn slope(first: &[f64], second: &[f64], of_file: &[f64]) -> Option<Sl
     moves.then(|| Slope { slope, left: rms(&residual) / (range.1 - range.0) })
 }
 
-impl Slope {
-    /// Whether the two turn together.
-    pub fn holds(&self) -> bool {
-        self.left < TOGETHER
-    }
-}
-
 /// Counts of a turn, from counts over an angle in rad: the power of two that they nearly are; and how far off, as a
 /// share.
 pub(super) fn counts_of_a_turn(per_rad: f64) -> Option<(f64, f64)> {
@@ -79,13 +72,6 @@ pub(super) struct TorqueSays {
     pub slope: f64,
     /// Share of what the turns of the output leave of the error that it explains.
     pub share: f64,
-}
-
-impl TorqueSays {
-    /// Whether the sign is clear.
-    pub(crate) fn is_clear(&self) -> bool {
-        self.share > CLEAR
-    }
 }
 
 /// How an error (rad) follows a torque in addition to what turns with the output (rad): an eccentric encoder and the
@@ -140,19 +126,19 @@ mod tests {
         let out: Vec<f64> = motor.iter().map(|m| 65_536.0 / TAU * (m / 101.0 + 1e-3 * (m / 101.0).sin())).collect();
         let one = vec![0.0; 3000];
         let found = slope(&out, &motor, &one).unwrap();
-        assert!(found.holds());
+        assert!(found.left < TOGETHER);
         // A second file, with zeros of its own.
         let two: Vec<f64> = (0..3000).map(|k| f64::from(u8::from(k >= 1200))).collect();
         let again =
             |values: &[f64], by: f64| values.iter().zip(&two).map(|(v, two)| v + by * two).collect::<Vec<f64>>();
         let (out_again, motor_again) = (again(&out, 90_000.0), again(&motor, -40.0));
-        assert!(!slope(&out_again, &motor_again, &one).unwrap().holds());
+        assert!(slope(&out_again, &motor_again, &one).unwrap().left >= TOGETHER);
         let found_again = slope(&out_again, &motor_again, &two).unwrap();
-        assert!(found_again.holds() && (found_again.slope / found.slope - 1.0).abs() < 1e-3, "{found_again:?}");
+        assert!(found_again.left < TOGETHER && (found_again.slope / found.slope - 1.0).abs() < 1e-3, "{found_again:?}");
         let counts = |of: f64| counts_of_a_turn(of / TAU).map(|(counts, _)| counts);
         assert_eq!((counts(-65_536.0), counts(20_000.1), counts(2.7e8)), (Some(65_536.0), None, None));
         let noise: Vec<f64> = (0..3000).map(|k| f64::from((k * 7919) % 3001)).collect();
-        assert!(!slope(&noise, &motor, &one).unwrap().holds());
+        assert!(slope(&noise, &motor, &one).unwrap().left >= TOGETHER);
     }
 
     #[test]
@@ -165,7 +151,7 @@ mod tests {
         for (error, of_file) in [(&error, &vec![0.0; 2000]), (&other_zero, &two)] {
             let reached: Vec<f64> = out.iter().zip(error).map(|(o, e)| o + e).collect();
             let says = torque_says(error, &reached, &torque, of_file).unwrap();
-            assert!(says.is_clear() && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
+            assert!(says.share > CLEAR && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
         }
         // A ramp of the load goes with the output: what the wheels do on the way is as well the torque's.
         let short: Vec<f64> = out[..300].to_vec();
@@ -173,6 +159,6 @@ mod tests {
         let error: Vec<f64> = short.iter().zip(&ramp).map(|(o, t)| t / 3e4 - 3e-4 * (9.0 * o).sin()).collect();
         let reached: Vec<f64> = short.iter().zip(&error).map(|(o, e)| o + e).collect();
         let says = torque_says(&error, &reached, &ramp, &vec![0.0; 300]).unwrap();
-        assert!(!says.is_clear(), "{says:?}");
+        assert!(says.share <= CLEAR, "{says:?}");
     }
 }

@@ -11,8 +11,10 @@ impl Recording {
         if together <= 1 {
             return;
         }
+        let mean = |rows: &[f64]| rows.iter().sum::<f64>() / rows.len() as f64;
         for session in &mut self.sessions {
-            session.average(together);
+            let line = session.line.iter().copied().step_by(together).collect();
+            *session = session.each(line, |values| values.chunks(together).map(mean).collect());
         }
         for step in &mut self.tooth_steps {
             step.row /= together;
@@ -22,17 +24,6 @@ impl Recording {
             "{rows} rows: every {together} neighbours are averaged, {left} rows are diagnosed; what repeats within \
              {together} rows cannot be seen (cut the file to see it)"
         ));
-    }
-}
-
-impl Session {
-    /// Takes the mean of each `together` rows (at least one), of the rest at the end as well.
-    fn average(&mut self, together: usize) {
-        let mean = |values: &mut Vec<f64>| {
-            *values = values.chunks(together).map(|rows| rows.iter().sum::<f64>() / rows.len() as f64).collect();
-        };
-        self.columns_mut().for_each(mean);
-        self.line = self.line.iter().copied().step_by(together).collect();
     }
 }
 

@@ -103,7 +103,8 @@ pub enum OptionError {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColumnMap {
     given: Vec<GivenColumn>,
-    rate_hz: Option<f64>,
+    /// The rate of rows, Hz, if it was said.
+    pub(super) rate_hz: Option<f64>,
 }
 
 /// A column that was named.
@@ -191,11 +192,6 @@ impl ColumnMap {
     pub fn counts_of_output(&self) -> Option<f64> {
         let reading = self.given(Quantity::Output)?.reading?;
         (reading.unit == Unit::Count).then(|| reading.gain.recip())
-    }
-
-    /// The rate of rows, Hz, if it was said.
-    pub(super) fn rate_hz(&self) -> Option<f64> {
-        self.rate_hz
     }
 
     /// The names that are looked for.

@@ -111,21 +111,15 @@ impl Log {
 
     /// Leaves out the rows for which `drop` is true.
     pub(crate) fn leave_out(&mut self, drop: &[bool]) {
-        leave_out(&mut self.line, drop);
-        if !self.session.is_empty() {
-            leave_out(&mut self.session, drop);
-        }
-        self.columns.iter_mut().flatten().for_each(|values| leave_out(values, drop));
+        self.line = kept(&self.line, drop);
+        self.session = kept(&self.session, drop);
+        self.columns.iter_mut().flatten().for_each(|values| *values = kept(values, drop));
     }
 }
 
-/// Leaves out the values for which `drop` is true.
-pub(super) fn leave_out<T>(values: &mut Vec<T>, drop: &[bool]) {
-    let mut row = 0;
-    values.retain(|_| {
-        row += 1;
-        !drop[row - 1]
-    });
+/// The values for which `drop` is not true.
+pub(super) fn kept<T: Copy>(values: &[T], drop: &[bool]) -> Vec<T> {
+    values.iter().zip(drop).filter(|(_, drop)| !**drop).map(|(value, _)| *value).collect()
 }
 
 /// A file as it was read.
@@ -158,7 +152,7 @@ pub(super) fn read(
     let read = sheet.columns(&places).map_err(refuse)?;
     findings.notes.extend(map.misspelt(&layout.names, &columns));
     findings.notes.extend(sheet.notes.iter().chain(&read.notes).cloned());
-    match of_columns(layout, read, &columns, map.rate_hz(), fewest, findings) {
+    match of_columns(layout, read, &columns, map.rate_hz, fewest, findings) {
         (_, Some(problem)) => Err(refuse(problem)),
         (log, None) => Ok(LogFile { log, columns, own_zeros: false }),
     }

@@ -145,39 +145,31 @@ impl Session {
         }
     }
 
-    /// Its columns of numbers: both angles, and each other column that was recorded.
-    fn columns_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
-        let others = [
-            &mut self.time_s,
-            &mut self.torque_n_m,
-            &mut self.temperature_c,
-            &mut self.orientation_rad,
-            &mut self.loudness,
-        ];
-        [&mut self.generator_rad, &mut self.error_rad].into_iter().chain(others.into_iter().flatten())
+    /// With these lines, and each of its columns of numbers changed by `of`.
+    fn each(&self, line: Vec<u64>, of: impl Fn(&[f64]) -> Vec<f64>) -> Session {
+        let recorded = |values: &Option<Vec<f64>>| values.as_deref().map(&of);
+        Session {
+            line,
+            generator_rad: of(&self.generator_rad),
+            error_rad: of(&self.error_rad),
+            time_s: recorded(&self.time_s),
+            torque_n_m: recorded(&self.torque_n_m),
+            temperature_c: recorded(&self.temperature_c),
+            orientation_rad: recorded(&self.orientation_rad),
+            loudness: recorded(&self.loudness),
+            ..*self
+        }
     }
 
     /// Leaves out the rows for which `drop` is true.
     pub(crate) fn leave_out(&mut self, drop: &[bool]) {
-        self.columns_mut().for_each(|values| log::leave_out(values, drop));
-        log::leave_out(&mut self.line, drop);
+        *self = self.each(log::kept(&self.line, drop), |values| log::kept(values, drop));
     }
 
     /// Some of its rows as a session.
     #[must_use]
     pub(crate) fn part(&self, rows: Range<usize>) -> Session {
-        let cut = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[rows.clone()].to_vec());
-        Session {
-            line: self.line[rows.clone()].to_vec(),
-            generator_rad: self.generator_rad[rows.clone()].to_vec(),
-            error_rad: self.error_rad[rows.clone()].to_vec(),
-            time_s: cut(&self.time_s),
-            torque_n_m: cut(&self.torque_n_m),
-            temperature_c: cut(&self.temperature_c),
-            orientation_rad: cut(&self.orientation_rad),
-            loudness: cut(&self.loudness),
-            ..*self
-        }
+        self.each(self.line[rows.clone()].to_vec(), |values| values[rows.clone()].to_vec())
     }
 }
 
@@ -230,7 +222,7 @@ pub(crate) fn rates(sessions: &[Range<usize>], time: &[f64], values: &[f64]) -> 
 }
 
 /// A file of measured data, ready for use.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recording {
     /// Which file.
     pub file: String,
@@ -252,15 +244,8 @@ impl Recording {
     /// The same file with these sessions, none of its faults reported again.
     #[must_use]
     pub(crate) fn with_sessions(&self, sessions: Vec<Session>) -> Recording {
-        Recording {
-            file: self.file.clone(),
-            rows: self.rows,
-            sessions,
-            faults: Vec::new(),
-            tooth_steps: Vec::new(),
-            notes: Vec::new(),
-            unusable: self.unusable.clone(),
-        }
+        let (file, unusable) = (self.file.clone(), self.unusable.clone());
+        Recording { file, rows: self.rows, sessions, unusable, ..Recording::default() }
     }
 }
 
@@ -272,10 +257,8 @@ pub fn bytes_of(path: &Path) -> Result<(String, Vec<u8>), MeasuredError> {
     let file = path.display().to_string();
     match std::fs::read(path) {
         Ok(bytes) => Ok((file, bytes)),
-        Err(_) if path.is_dir() => {
-            Err(MeasuredError { file, line: None, what: "found a folder; allowed: a file".to_owned() })
-        }
-        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
+        Err(_) if path.is_dir() => Err(MeasuredError::of_file(&file, &"found a folder; allowed: a file")),
+        Err(error) => Err(MeasuredError::of_file(&file, &error)),
     }
 }
 
@@ -321,7 +304,7 @@ pub(crate) fn parse_at_least(
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
     findings.notes.extend(many_sessions(&sessions));
-    for (session, off_rad) in other_zeros.iter().copied() {
+    for (session, off_rad) in other_zeros {
         sessions[session].own_zero = true;
         sessions[session..].iter_mut().for_each(|later| later.zero_off_rad = off_rad);
     }
@@ -335,9 +318,9 @@ pub(crate) fn parse_at_least(
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
-    let in_doubt = faults::steps::check(&mut sessions, gear, &mut findings);
-    // Steps that stay in the data look like drift; what may be one between two sessions may be drift as well.
-    if !in_doubt && findings.tooth_steps.is_empty() && !drifts {
+    faults::steps::check(&mut sessions, gear, &mut findings);
+    // Steps that stay in the data look like drift.
+    if findings.tooth_steps.is_empty() && !drifts {
         faults::drift::check(&mut sessions, gear, &mut findings);
     }
     let Findings { mut faults, tooth_steps, notes } = findings;
@@ -391,11 +374,6 @@ impl ReadRows {
         let refused = refused.map(|problem| MeasuredError::at(&file.file, problem));
         let refused = refused.or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why)));
         (ReadRows { log, stamps_s, notes, milliseconds }, refused)
-    }
-
-    /// Sessions, one at least.
-    pub(crate) fn sessions(&self) -> usize {
-        self.log.sessions().count().max(1)
     }
 }
 

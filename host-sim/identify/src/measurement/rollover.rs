@@ -34,9 +34,9 @@ const EXCLUDED: f64 = 3.0;
 /// Whole counts are distinguishable if the standard deviation of the span is below this: half a count is two of them.
 /// *Source*: derived.
 const RESOLVES_COUNTS: f64 = 0.25;
-/// One count is said to be in doubt if the standard deviation of the span is below this, counts; above it, nothing is
-/// known of single counts. *Guess*: then two or three numbers of counts are likely.
-const IN_DOUBT: f64 = 1.0;
+/// The whole count nearest to the span is taken if the standard deviation of the span is below this, counts; above it,
+/// nothing is known of single counts. *Guess*: then two or three numbers of counts are likely.
+const NEAR_A_COUNT: f64 = 1.0;
 /// This share of the leaps must have one size. *Guess*: the others are gaps and counts that were lost.
 const AGREE: f64 = 0.8;
 /// A span that no register has is believed from this number of leaps on: one leap may be anything. *Guess*: two that
@@ -60,8 +60,6 @@ pub(crate) struct Anew {
     pub span: f64,
     /// Times.
     pub times: usize,
-    /// The other span that the leaps may have, one count or a few away, where they do not decide.
-    pub or: Option<f64>,
     /// Whether some rows are so far apart that the way between them is not certain.
     pub ambiguous: bool,
 }
@@ -69,9 +67,8 @@ pub(crate) struct Anew {
 impl Anew {
     /// A sentence on it: "begins anew after 32767 (8 times)".
     pub fn text(&self, unit: &str) -> String {
-        let or = self.or.map_or(String::new(), |or| format!("; one count is in doubt, it may be {or}"));
         // A turn in degrees is 360 to the last digit but one.
-        format!("begins anew after {}{unit} ({} times{or})", (1e9 * self.span).round() / 1e9, self.times)
+        format!("begins anew after {}{unit} ({} times)", (1e9 * self.span).round() / 1e9, self.times)
     }
 }
 
@@ -99,32 +96,21 @@ pub(crate) fn begins_anew(values: &[f64], spans: &[f64], counts: bool, along: Op
         return None;
     }
     let steps = || rows.windows(2).map(|pair| values[pair[1]] - values[pair[0]]);
-    let found = |span: f64, or: Option<f64>| {
+    let found = |span: f64| {
         let times = steps().filter(|step| step.abs() > LEAPS * span).count();
         let ambiguous = steps().any(|step| (step - span * (step / span).round()).abs() > UNAMBIGUOUS * span);
-        (times > 0).then_some(Anew { span, times, or, ambiguous })
+        (times > 0).then_some(Anew { span, times, ambiguous })
     };
     let whole = counts && steps().all(|step| (step - step.round()).abs() <= 1e-6 * (1.0 + step.abs()));
     let measured = MeasuredSpan::of(values, &rows, &leaps, whole, along);
     let near =
         |span: f64| measured.is_none_or(|seen| (seen.span - span).abs() <= (NEARLY * span).max(EXCLUDED * seen.std));
     let known = spans.iter().copied().find(|span| stays_within(range, *span, COVERED) && near(*span));
-    let Some(seen) = measured.filter(|seen| whole && seen.is_sharp()) else {
-        return known.and_then(|span| found(span, None));
-    };
-    let (nearest, off) = (seen.span.round(), known.map(|span| (seen.span - span).abs() / seen.std));
-    match (known, off) {
-        // The register that the values fill is believed until the leaps exclude it.
-        (Some(span), Some(off)) if off <= if seen.resolves_counts() { EXCLUDED } else { 0.5 * EXCLUDED } => {
-            found(span, None)
-        }
-        (Some(span), Some(_)) if !seen.resolves_counts() => found(span, (seen.std < IN_DOUBT).then_some(nearest)),
-        _ if seen.std < IN_DOUBT => {
-            let next = nearest + if seen.span > nearest { 1.0 } else { -1.0 };
-            found(nearest, (!seen.resolves_counts()).then_some(next))
-        }
-        _ => None,
-    }
+    let Some(seen) = measured.filter(|seen| whole && seen.agree) else { return known.and_then(found) };
+    // The register that the values fill is believed until the leaps exclude it.
+    let believed = |span: &f64| seen.std >= RESOLVES_COUNTS || (seen.span - span).abs() <= EXCLUDED * seen.std;
+    let nearest = Some(seen.span.round()).filter(|_| seen.std < NEAR_A_COUNT);
+    known.filter(believed).or(nearest).and_then(found)
 }
 
 /// The span as the leaps show it.
@@ -134,9 +120,8 @@ struct MeasuredSpan {
     span: f64,
     /// Its standard deviation.
     std: f64,
-    /// Leaps that show it.
-    leaps: usize,
-    /// Whether all leaps agree, go against the motion, and begin at one place of the span.
+    /// Whether leaps enough agree, go against the motion, and begin at one place of the span: then it can speak against
+    /// what registers have.
     agree: bool,
 }
 
@@ -176,19 +161,9 @@ impl MeasuredSpan {
             let off = place(leap) - place(leap).round();
             off.abs() * span <= leap.step.abs().max(kept[0].step.abs()) + 1.0
         });
-        let agree =
-            kept.len() as f64 >= AGREE * leaps.len() as f64 && kept.iter().all(|leap| leap.against) && at_one_place;
-        Some(MeasuredSpan { span, std: (scatter / sum).sqrt(), leaps: kept.len(), agree })
-    }
-
-    /// Whether it can speak against what registers have.
-    fn is_sharp(&self) -> bool {
-        self.agree && self.leaps >= FEWEST_LEAPS
-    }
-
-    /// Whether it decides between two numbers of counts.
-    fn resolves_counts(&self) -> bool {
-        self.std < RESOLVES_COUNTS
+        let enough = kept.len() >= FEWEST_LEAPS && kept.len() as f64 >= AGREE * leaps.len() as f64;
+        let agree = enough && kept.iter().all(|leap| leap.against) && at_one_place;
+        Some(MeasuredSpan { span, std: (scatter / sum).sqrt(), agree })
     }
 }
 
@@ -353,15 +328,15 @@ mod tests {
             .collect()
     }
 
-    fn span(values: &[f64]) -> Option<(f64, Option<f64>)> {
-        counters(values).filter(|anew| !anew.ambiguous).map(|anew| (anew.span, anew.or))
+    fn span(values: &[f64]) -> Option<f64> {
+        counters(values).filter(|anew| !anew.ambiguous).map(|anew| anew.span)
     }
 
     #[test]
     fn an_overflow_is_told_from_a_jump() {
         let sweep =
             |step: i64| -> Vec<f64> { (0..2000i64).map(|k| ((k * step + 40_000) % 65_536 - 32_768) as f64).collect() };
-        assert_eq!(counters(&sweep(1000)).map(|anew| (anew.span, anew.times, anew.or)), Some((65_536.0, 31, None)));
+        assert_eq!(counters(&sweep(1000)).map(|anew| (anew.span, anew.times)), Some((65_536.0, 31)));
         // Too fast to see which way.
         assert!(counters(&sweep(30_000)).is_none_or(|anew| anew.ambiguous));
         // A jump is no overflow, whatever its size.
@@ -377,12 +352,12 @@ mod tests {
     fn a_counter_may_have_any_number_of_states() {
         for states in [65_536.0, 32_768.0, 32_767.0, 32_766.0, 65_535.0, 10_000.0, 14_400.0] {
             let values: Vec<f64> = motion(32_000).iter().map(|at| at.round().rem_euclid(states)).collect();
-            assert_eq!(span(&values), Some((states, None)), "{states}");
+            assert_eq!(span(&values), Some(states), "{states}");
             // From minus half to plus half.
             let half = (states / 2.0).floor();
             let values: Vec<f64> =
                 motion(32_000).iter().map(|at| (at.round() + half).rem_euclid(states) - half).collect();
-            assert_eq!(span(&values), Some((states, None)), "{states}, about zero");
+            assert_eq!(span(&values), Some(states), "{states}, about zero");
         }
     }
 
@@ -394,7 +369,7 @@ mod tests {
         motion.iter_mut().for_each(|at| *at = (*at - 60_000.0).round());
         let values: Vec<f64> = motion.iter().map(|at| at % limit).collect();
         assert!(values.iter().any(|at| *at < -32_000.0) && values.iter().any(|at| *at > 10_000.0));
-        assert_eq!(span(&values).map(|(span, _)| span), Some(limit));
+        assert_eq!(span(&values), Some(limit));
         let mut made = values;
         continued(&mut made, limit);
         let off = made[0] - motion[0];
@@ -415,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn an_uneven_motion_leaves_one_count_in_doubt_unless_the_other_angle_tells() {
+    fn where_a_motion_is_uneven_the_other_angle_tells_the_last_count() {
         let mut random = fastrand::Rng::with_seed(9);
         let mut at = 20_000.0;
         let motion: Vec<f64> = (0..3000)
@@ -425,11 +400,9 @@ mod tests {
             })
             .collect();
         let values: Vec<f64> = motion.iter().map(|at| at.round().rem_euclid(32_767.0)).collect();
-        let alone = counters(&values).unwrap();
         let other: Vec<f64> = motion.iter().map(|at| at / 101.0 / 4096.0).collect();
         let helped = begins_anew(&values, &registers().collect::<Vec<_>>(), true, Some(&other)).unwrap();
-        println!("{alone:?} {helped:?}");
-        assert_eq!((helped.span, helped.or), (32_767.0, None));
+        assert_eq!(helped.span, 32_767.0);
     }
 
     #[test]

@@ -137,9 +137,8 @@ impl Unit {
     fn needs_gain(self) -> Option<&'static str> {
         match self {
             Unit::Count => Some("how many counts make a turn, for instance count/16777216"),
-            Unit::Ampere => Some("the torque at the output for an ampere, for instance A*3.5, or --torque-constant"),
-            Unit::Milliampere => {
-                Some("the torque at the output for a milliampere, for instance mA*0.0035, or --torque-constant")
+            Unit::Ampere | Unit::Milliampere => {
+                Some("the torque at the output for one, for instance A*3.5 or mA*0.0035, or --torque-constant")
             }
             Unit::Volt => Some("the torque for a volt, for instance V*20"),
             _ => None,

@@ -5,7 +5,7 @@
 
 use super::state::{Extra, StateModel};
 use super::steps::largest_torque;
-use super::{ARCSEC, Findings, LineFit, WIDEST_CLEARANCE_RAD, level, rows_of, throughout};
+use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, level, rows_of, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
@@ -15,16 +15,9 @@ use flexspline_base::robust::median_of;
 /// Drift of less than this over the whole recording is not looked for, rad. *Guess*: below what most causes do, and
 /// raised from 3 arcsec.
 const LEAST_RAD: f64 = 10.0 * ARCSEC;
-/// A trend is this many standard deviations, over stretches as long as the noise remembers. *Guess*: one more than the
-/// five by which causes are separated, as a repair changes the rows.
+/// A trend is this many standard deviations. *Guess*: one more than the five by which causes are separated, as a repair
+/// changes the rows.
 const CERTAIN: f64 = 6.0;
-/// Stretches of the recording that a trend is judged by. *Guess*: enough for a line and its scatter, each far longer
-/// than the noise remembers.
-const STRETCHES: usize = 24;
-/// Fewest stretches that show a trend. *Guess*: a third of [`STRETCHES`].
-const FEWEST_STRETCHES: usize = 8;
-/// Fewest rows of a stretch. *Guess*: enough for a median.
-const STRETCH_ROWS: usize = 8;
 /// Fewest gaps between sessions that separate a drift from offsets that are set anew. *Guess*: two gaps agree to a
 /// twentieth by chance in one recording of twenty.
 const FEWEST_GAPS: usize = 2;
@@ -63,10 +56,8 @@ const LEVEL_ROWS: usize = 12;
 
 /// Finds a linear drift over the whole recording, names it and takes it out.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    let Some((per_s, from_s, std)) = slope(sessions, gear) else { return };
-    let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
-    let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
-    let total = per_s * (last - first);
+    let Some(([total, std], [begin, end])) = slope(sessions, gear) else { return };
+    let per_s = total / (end - begin);
     let per_hour = 3600.0 * per_s / ARCSEC;
     let fault = throughout(sessions, FaultName::Drift).map(|fault| Fault {
         size_arcsec: Some(total / ARCSEC),
@@ -78,18 +69,18 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all \
              {:.2}), alike on both flanks, and not with temperature or position: a straight line in time is taken out",
             total / ARCSEC,
-            std * (last - first) / ARCSEC
+            std / ARCSEC
         )
     });
     for session in sessions.iter_mut() {
         if let Some(time) = &session.time_s {
-            session.error_rad.iter_mut().zip(time).for_each(|(error, t)| *error -= per_s * (t - from_s));
+            session.error_rad.iter_mut().zip(time).for_each(|(error, t)| *error -= per_s * (t - 0.5 * (begin + end)));
         }
     }
 }
 
-/// Drift, rad/s, the time at which it is taken as zero (the middle), and its standard deviation.
-pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
+/// Drift over the whole recording and its standard deviation, rad; when it begins and ends, s.
+pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option<([f64; 2], [f64; 2])> {
     if sessions.iter().any(|session| session.time_s.is_none() || session.len() < 2) {
         return None;
     }
@@ -133,67 +124,28 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
     if confused && drift.abs() < BEYOND_CONFUSION * formal {
         return None;
     }
-    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain.
-    let lefts: Vec<Vec<(f64, f64)>> = (0..sessions.len())
-        .map(|s| {
-            let left = state.left(&fit, s, &all);
-            left.iter().enumerate().map(|(row, left)| (tau(s, row), left + drift * tau(s, row))).collect()
-        })
-        .collect();
-    if confused && (lefts.len() <= FEWEST_GAPS || !on_the_line(&lefts, drift)) {
+    // Whether the middles of sessions lie on the line: what is left there.
+    let on_the_line = || {
+        let lefts: Vec<f64> = (0..sessions.len()).map(|s| median_of(&mut state.left(&fit, s, &all))).collect();
+        let zero = median_of(&mut lefts.clone());
+        lefts.iter().all(|left| (left - zero).abs() < OFF_THE_LINE * 2.0 * drift.abs())
+    };
+    if confused && (sessions.len() <= FEWEST_GAPS || !on_the_line()) {
         return None;
     }
     // A zero that is set anew in each session may lie anywhere, also about a line; within the sessions it stands then.
-    if (2..=MOST_ZEROS).contains(&lefts.len()) && !goes_on_within(&state, &all, place, drift, &lefts) {
-        return None;
+    let zeros: Vec<_> = (1..sessions.len()).map(|of| move |s: usize, _: usize| f64::from(u8::from(s == of))).collect();
+    let columns: Vec<Extra> = all.into_iter().chain(zeros.iter().map(|zero| zero as Extra)).collect();
+    if (2..=MOST_ZEROS).contains(&sessions.len())
+        && let Some(fit) = state.fit(&columns)
+    {
+        let (within, std) = (fit.value[place], fit.std[place]);
+        let unlike = (within - drift).abs() > WITHIN * drift.abs() + WITHIN_STDS * std;
+        if unlike || WITHIN_STDS * std >= SHOWS * drift.abs() && !on_the_line() {
+            return None;
+        }
     }
-    let per_s = 2.0 / (end - begin);
-    let (trend, std) = line(&of_stretches(&lefts))?;
-    let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
-    certain.then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
-}
-
-/// A time in units of the recording, from -1 to 1, and what is left of the error there, rad.
-type Point = (f64, f64);
-
-/// Medians of stretches of rows, none over a break.
-fn of_stretches(lefts: &[Vec<Point>]) -> Vec<Point> {
-    let rows = lefts.iter().map(Vec::len).sum();
-    let stretches = |left: &Vec<Point>| {
-        let long = left.len().div_ceil((STRETCHES * left.len()).div_ceil(rows).max(1)).max(1);
-        left.chunks(long).filter(|part| part.len() >= STRETCH_ROWS).map(middle_of).collect::<Vec<Point>>()
-    };
-    lefts.iter().flat_map(stretches).collect()
-}
-
-/// Mean time and median error.
-fn middle_of(part: &[Point]) -> Point {
-    let tau = part.iter().map(|of| of.0).sum::<f64>() / part.len() as f64;
-    (tau, median_of(&mut part.iter().map(|of| of.1).collect::<Vec<f64>>()))
-}
-
-/// Whether the zero moves within sessions, a zero of each free, as it does over all of them; where that does not show,
-/// whether the sessions lie on one line. `place` is where the first of the columns of `drifts` stands.
-fn goes_on_within(state: &StateModel, drifts: &[Extra], place: usize, drift: f64, lefts: &[Vec<Point>]) -> bool {
-    let zeros: Vec<_> = (1..lefts.len()).map(|of| move |s: usize, _: usize| f64::from(u8::from(s == of))).collect();
-    let mut columns: Vec<Extra> = drifts.to_vec();
-    columns.extend(zeros.iter().map(|zero| zero as Extra));
-    let Some(fit) = state.fit(&columns) else { return true };
-    let (within, std) = (fit.value[place], fit.std[place]);
-    if (within - drift).abs() > WITHIN * drift.abs() + WITHIN_STDS * std {
-        return false;
-    }
-    let shows = WITHIN_STDS * std < SHOWS * drift.abs();
-    shows || on_the_line(lefts, drift)
-}
-
-/// Whether the middles of sessions lie on a line of this slope.
-fn on_the_line(lefts: &[Vec<Point>], drift: f64) -> bool {
-    let middles: Vec<Point> = lefts.iter().map(|left| middle_of(left)).collect();
-    let Some((low, high)) = middles.first().zip(middles.last()) else { return false };
-    let zero = median_of(&mut middles.iter().map(|of| of.1 - drift * of.0).collect::<Vec<f64>>());
-    let off = |of: &Point| (of.1 - drift * of.0 - zero).abs();
-    middles.iter().all(|of| off(of) < OFF_THE_LINE * (drift * (high.0 - low.0)).abs())
+    ((drift / formal).abs() > CERTAIN).then_some(([2.0 * drift, 2.0 * formal], [begin, end]))
 }
 
 /// The error from this row on, rad: a median of a few rows.
@@ -215,19 +167,6 @@ fn largest_leap(sessions: &[Session]) -> f64 {
         }
     }
     largest
-}
-
-/// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
-fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
-    if points.len() < FEWEST_STRETCHES {
-        return None;
-    }
-    let LineFit { slope, square, residual } = LineFit::of(points);
-    let own: f64 = residual.iter().map(|l| l * l).sum();
-    let next: f64 = residual.windows(2).map(|l| l[0] * l[1]).sum();
-    let correlation = if own > 0.0 { (next / own).clamp(0.0, 0.9) } else { 0.0 };
-    let std = (own / (points.len() as f64 - 2.0) / square * (1.0 + correlation) / (1.0 - correlation)).sqrt();
-    Some((slope, std.max(1e-12)))
 }
 
 #[cfg(test)]

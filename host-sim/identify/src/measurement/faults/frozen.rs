@@ -21,9 +21,6 @@ const BLURRED: f64 = 0.6;
 const SHORTEST: usize = 20;
 /// White noise below this is none at the output, rad: what a solver leaves. *Guess*: far below any encoder.
 const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
-/// An output that dwells for longer than this, rad, and catches up in one row, has been frozen; clearance is given back
-/// on the way.
-const DWELL_RAD: f64 = WIDEST_CLEARANCE_RAD;
 /// An output that dwells for longer than this, rad, has been frozen: clearance and as much of wind-up are shorter.
 /// *Guess*.
 const LONG_DWELL_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
@@ -72,20 +69,14 @@ pub(in crate::measurement) fn check(
     for (number, (session, output)) in sessions.iter().zip(&outputs).enumerate() {
         let generator = &session.generator_rad;
         let mut frozen: Vec<(Quantity, Range<usize>, f64)> = Vec::new();
-        // A channel, the other one, and how far the one goes with the other.
-        let angles =
-            [(follower, output, generator, 1.0 / gear.ratio), (Quantity::Generator, generator, output, gear.ratio)];
-        for (channel, values, other, gain) in angles.into_iter().take(if error_recorded { 1 } else { 2 }) {
+        // A channel, and the other one.
+        let angles = [(follower, output, generator), (Quantity::Generator, generator, output)];
+        for (channel, values, other) in angles.into_iter().take(if error_recorded { 1 } else { 2 }) {
             let of_output = channel != Quantity::Generator;
             for stretch in stretches(values, 3, same) {
                 let missed = missed(other, &stretch) / if of_output { gear.ratio.abs() } else { 1.0 };
-                let catches_up = values.get(stretch.end).is_some_and(|next| {
-                    let due = (other[stretch.end] - other[stretch.start]) * gain;
-                    (next - values[stretch.start]) * due.signum() > 0.5 * due.abs()
-                });
                 let long = missed > LONG_DWELL_RAD && (of_output || !slips_a_tooth(output, &stretch, gear));
-                let dwells = missed > DWELL_RAD && missed <= LONG_DWELL_RAD && catches_up;
-                if long || dwells || (of_output && outputs_noisy && stretch.len() >= longest) {
+                if long || (of_output && outputs_noisy && stretch.len() >= longest) {
                     frozen.push((channel, stretch, missed));
                 }
             }

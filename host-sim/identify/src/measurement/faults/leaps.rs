@@ -125,25 +125,18 @@ pub(in crate::measurement) fn between_sessions(
     gear: &Gear,
     findings: &mut Findings,
 ) -> Vec<(usize, f64)> {
-    let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else {
-        return Vec::new();
-    };
     let sessions: Vec<Range<usize>> = log.sessions().collect();
-    if sessions.len() < 2 {
-        return Vec::new();
-    }
-    let error: Vec<f64> = output.iter().zip(generator).map(|(output, psi)| output - psi / gear.ratio).collect();
-    let slope = slope(generator, &error, &sessions);
+    let Some(error) = error_of(log, gear).filter(|_| sessions.len() > 1) else { return Vec::new() };
+    let grows = grows(log.get(Quantity::Generator).unwrap_or_default(), &error, &sessions);
     let mut restarts: Vec<Turns> = Vec::new();
     // The rows at which sessions of another zero begin, with its change, rad.
     let mut others: Vec<(usize, f64)> = Vec::new();
     let mut taken_off: Vec<(usize, f64)> = Vec::new();
     for (session, (start, change)) in (1..).zip(between(&sessions)) {
         let jump = change(&error);
-        let without_slope = jump - slope * change(generator);
         if let Some(turns) = whole_turns(-jump * gear.ratio) {
             restarts.push((start, turns));
-        } else if slope == 0.0 && without_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, NEAR_PITCHES) {
+        } else if !grows && jump.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, NEAR_PITCHES) {
             others.push((start, jump));
             taken_off.push((session, taken_off.last().map_or(0.0, |(_, off)| *off) + jump));
         }
@@ -188,22 +181,24 @@ pub(in crate::measurement) fn between_sessions(
     taken_off
 }
 
-/// Whether a session begins with another zero, by no whole turns of the generator.
-pub(in crate::measurement) fn has_other_zeros(log: &Log, gear: &Gear) -> bool {
-    let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else {
-        return false;
-    };
-    let error: Vec<f64> = output.iter().zip(generator).map(|(output, psi)| output - psi / gear.ratio).collect();
-    let sessions: Vec<Range<usize>> = log.sessions().collect();
-    between(&sessions).any(|(_, change)| change(&error).abs() > OTHER_ZERO_RAD)
+/// Output less generator over ratio; none where the error was recorded.
+fn error_of(log: &Log, gear: &Gear) -> Option<Vec<f64>> {
+    let rows = log.get(Quantity::Output)?.iter().zip(log.get(Quantity::Generator)?);
+    Some(rows.map(|(output, psi)| output - psi / gear.ratio).collect())
 }
 
-/// By how much the error grows with the angle within sessions, where that is beyond what a drive does; else 0.
-fn slope(generator: &[f64], error: &[f64], sessions: &[Range<usize>]) -> f64 {
+/// Whether a session begins with another zero, by no whole turns of the generator.
+pub(in crate::measurement) fn has_other_zeros(log: &Log, gear: &Gear) -> bool {
+    let sessions: Vec<Range<usize>> = log.sessions().collect();
+    let other = |error: Vec<f64>| between(&sessions).any(|(_, change)| change(&error).abs() > OTHER_ZERO_RAD);
+    error_of(log, gear).is_some_and(other)
+}
+
+/// Whether the error grows with the angle within sessions, beyond what a drive does.
+fn grows(generator: &[f64], error: &[f64], sessions: &[Range<usize>]) -> bool {
     let of = |(turned, changed): (f64, f64)| (turned > TAU).then_some(changed / turned);
     let mut slopes: Vec<f64> = sessions.iter().filter_map(|rows| of(extent(generator, error, rows.clone())?)).collect();
-    let of_turns = median_of(&mut slopes);
-    if of_turns.abs() > SLOPE / TAU / 10.0 { of_turns } else { 0.0 }
+    median_of(&mut slopes).abs() > SLOPE / TAU / 10.0
 }
 
 #[cfg(test)]

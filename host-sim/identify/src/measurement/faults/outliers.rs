@@ -212,8 +212,7 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
     leave_out_rows(sessions, drop);
     if many {
         let tail = (TAIL * noise).max(STEPS * resolution);
-        let rounds = (0..TAIL_ROUNDS).map(|round| if round == 0 { AROUND_ONE } else { 0 });
-        let more: u64 = rounds.map(|ends| leave_out_the_doubtful(sessions, tail, ends)).sum();
+        let more: u64 = (0..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(sessions, tail)).sum();
         if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
             fault.rows += more;
         }
@@ -232,17 +231,13 @@ const TAIL: f64 = 4.0;
 const TAIL_ROUNDS: usize = 3;
 
 /// Where many rows are out, those are as well that stand next to others, or where the drive might have moved them, at
-/// reversals and steps of the load; and nothing bears the first and last rows of a session out, `ends` of them. Gives
-/// how many are left out.
-fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> u64 {
+/// reversals and steps of the load. Gives how many are left out.
+fn leave_out_the_doubtful(sessions: &mut [Session], least: f64) -> u64 {
     let mut more = 0;
     for session in sessions.iter_mut().filter(|session| session.len() > 4 * AROUND_ONE) {
-        let (error, last) = (&session.error_rad, session.len() - ends);
+        let error = &session.error_rad;
         let drop: Vec<bool> = (0..error.len())
             .map(|row| {
-                if row < ends || row >= last {
-                    return true;
-                }
                 if row < AROUND_ONE || row + AROUND_ONE >= error.len() {
                     return false;
                 }

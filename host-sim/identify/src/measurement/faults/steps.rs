@@ -2,8 +2,7 @@
 //!
 //! A step happens within one row, faster than an output at rest could give it (a dwell in the clearance changes the
 //! error by no more than the generator moves), and it stays, through reversals and at any load. Clearance that is
-//! crossed, wind-up and damaged teeth do not: they come back with the state of the drive. A counter that loses counts
-//! may be set right before the next session: then its steps stay until their session ends.
+//! crossed, wind-up and damaged teeth do not: they come back with the state of the drive.
 
 use super::state::{Extra, StateFit, StateModel};
 use super::{ARCSEC, Findings, level, of_rows, whole_pitches};
@@ -73,25 +72,11 @@ const APART: usize = 12;
 struct StepPlace {
     session: usize,
     row: usize,
-    stays: Stays,
-}
-
-/// How long steps stay.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stays {
-    ForGood,
-    /// Until their session ends: the counter is set right before the next one.
-    ToTheEnd,
 }
 
 impl StepPlace {
     fn reached(self, session: usize, row: usize) -> f64 {
-        let stays = self.stays == Stays::ForGood || session == self.session;
-        f64::from(u8::from(stays && (session, row) >= (self.session, self.row)))
-    }
-
-    fn is_near(self, other: StepPlace) -> bool {
-        other.session == self.session && other.row.abs_diff(self.row) < WINDOW / 2
+        f64::from(u8::from((session, row) >= (self.session, self.row)))
     }
 }
 
@@ -107,11 +92,9 @@ fn with_columns<T>(steps: impl IntoIterator<Item = StepPlace>, more: &[Extra], t
     then(&all)
 }
 
-/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Returns whether a step stays
-/// inside a session that may be one of an encoder or a change of flank; at its ends it may as well be between two.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> bool {
-    let Some(FoundSteps { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return false };
-    let some_inside = doubtful.iter().any(|(place, ..)| is_inside(&sessions[place.session], place.row));
+/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
+    let Some([sure, doubtful]) = Seen::of(sessions, gear).find() else { return };
     for (place, size, _) in &doubtful {
         let line = sessions[place.session].line[place.row];
         findings.notes.push(format!(
@@ -123,7 +106,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     for (place, size, std) in sure {
         let (session, size_arcsec) = (&sessions[place.session], size / ARCSEC);
         let (line, time_s) = (session.line[place.row], session.time_s.as_ref().map(|time| time[place.row]));
-        if let Some(pitch) = gear.tooth_pitch_rad.filter(|_| stays == Stays::ForGood) {
+        if let Some(pitch) = gear.tooth_pitch_rad {
             let pitches = (size / pitch).round();
             if pitches != 0.0 && (size - pitches * pitch).abs() < (5.0 * std).max(WHOLE_PITCH * pitch) {
                 let StepPlace { session, row, .. } = place;
@@ -132,18 +115,12 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
                 continue;
             }
         }
-        let lasting = match stays {
-            Stays::ForGood => "there: an encoder has lost its index",
-            Stays::ToTheEnd => {
-                "until the session ends: a counter has lost counts, and was set right before the next one"
-            }
-        };
         let fault = of_rows(sessions, FaultName::EncoderIndexJump, [(place.session, place.row)]);
         let fault = fault.map(|fault| Fault { size_arcsec: Some(size_arcsec), until_s: None, ..fault });
         findings.add(fault, Quantity::Error, Treatment::Repaired, |_| {
             format!(
                 "the error steps by {size_arcsec:.1} arcsec (standard deviation {:.1}) within one row and stays \
-                 {lasting}; the step is taken out",
+                 there: an encoder has lost its index; the step is taken out",
                 std / ARCSEC
             )
         });
@@ -152,40 +129,10 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             rows.for_each(|(row, error)| *error -= size * place.reached(number, row));
         }
     }
-    some_inside
-}
-
-/// Whether this many rows of its session are before and after a row that means over them are compared.
-fn is_inside(session: &Session, row: usize) -> bool {
-    row >= WINDOW && row + WINDOW <= session.len()
 }
 
 /// A step with its size and standard deviation.
 type Step = (StepPlace, f64, f64);
-
-/// Steps of a recording.
-struct FoundSteps {
-    /// Lasting ones.
-    sure: Vec<Step>,
-    /// Those that may be a change of flank.
-    doubtful: Vec<Step>,
-    stays: Stays,
-    /// Sum of squared, weighted residuals.
-    misfit: f64,
-    /// Whether any row was suspected.
-    suspected: bool,
-}
-
-/// Steps that stay for good or to the end of their session, whichever leaves less.
-fn likelier(sessions: &[Session], gear: &Gear) -> Option<FoundSteps> {
-    let seen = Seen::of(sessions, gear);
-    let for_good = seen.find(Stays::ForGood)?;
-    if sessions.len() == 1 || !for_good.suspected {
-        return Some(for_good);
-    }
-    let better = |found: &FoundSteps| found.misfit < CLEARLY_LESS * for_good.misfit && !found.sure.is_empty();
-    Some(seen.find(Stays::ToTheEnd).filter(better).unwrap_or(for_good))
-}
 
 /// A recording with what is known of it.
 struct Seen<'a> {
@@ -208,18 +155,16 @@ impl<'a> Seen<'a> {
     }
 
     /// All rows but the first of each session.
-    fn rows(&self, stays: Stays) -> impl Iterator<Item = StepPlace> + '_ {
-        let of =
-            move |(session, of): (usize, &Session)| (1..of.len()).map(move |row| StepPlace { session, row, stays });
+    fn rows(&self) -> impl Iterator<Item = StepPlace> + '_ {
+        let of = |(session, of): (usize, &Session)| (1..of.len()).map(move |row| StepPlace { session, row });
         self.sessions.iter().enumerate().flat_map(of)
     }
 
-    /// Steps that stay so long.
-    fn find(&self, stays: Stays) -> Option<FoundSteps> {
-        let mut places = self.sudden(stays);
-        let mut suspected = !places.is_empty();
+    /// Lasting steps, and those that may be a change of flank.
+    fn find(&self) -> Option<[Vec<Step>; 2]> {
+        let mut places = self.sudden();
         let mut rejected: Vec<StepPlace> = Vec::new();
-        let (mut steps, mut misfit): (Vec<Step>, f64) = (Vec::new(), f64::INFINITY);
+        let mut steps: Vec<Step> = Vec::new();
         for round in 0..ROUNDS {
             // Drop one by one what does not last, the weakest first.
             let fit = loop {
@@ -233,24 +178,20 @@ impl<'a> Seen<'a> {
                     _ => break fit,
                 }
             };
-            misfit = fit.misfit;
             if round + 1 == ROUNDS {
                 break;
             }
             let known: Vec<StepPlace> = places.iter().chain(&rejected).copied().collect();
-            let more = self.standing_out(&fit, &places, &known, stays);
+            let more = self.standing_out(&fit, &places, &known);
             if more.is_empty() {
                 break;
             }
-            suspected = true;
             places.extend(more);
             places.sort_by_key(|place| (place.session, place.row));
         }
-        // Steps that are set right between sessions take nothing back.
-        let together = |a: &Step, b: &Step| stays == Stays::ForGood || a.0.session == b.0.session;
-        let steps: Vec<Step> = steps.chunk_by(together).flat_map(|of| lasting(of.to_vec())).collect();
+        let steps = lasting(steps);
         let (sure, doubtful) = steps.iter().copied().partition(|step| self.no_flank_was_changed(&steps, *step));
-        Some(FoundSteps { sure, doubtful, stays, misfit, suspected })
+        Some([sure, doubtful])
     }
 
     /// The change of the error into a row.
@@ -276,16 +217,16 @@ impl<'a> Seen<'a> {
     }
 
     /// Rows into which the error changes more than anything smooth explains, the largest changes first.
-    fn sudden(&self, stays: Stays) -> Vec<StepPlace> {
-        let changes: Vec<f64> = self.rows(stays).map(|place| self.change(place)).collect();
+    fn sudden(&self) -> Vec<StepPlace> {
+        let changes: Vec<f64> = self.rows().map(|place| self.change(place)).collect();
         let usual = median_and_std(&mut sampled(&changes)).1;
         let least = (SUDDEN * usual.max(self.noise)).max(LEAST_RAD);
-        let by = self.rows(stays).map(|place| (place, self.beyond_dwell(place).abs()));
+        let by = self.rows().map(|place| (place, self.beyond_dwell(place).abs()));
         largest(by.filter(|(_, by)| *by > least).collect(), &[])
     }
 
     /// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
-    fn standing_out(&self, fit: &StateFit, places: &[StepPlace], known: &[StepPlace], stays: Stays) -> Vec<StepPlace> {
+    fn standing_out(&self, fit: &StateFit, places: &[StepPlace], known: &[StepPlace]) -> Vec<StepPlace> {
         let differences = |number: usize| -> Vec<f64> {
             let left = with_columns(places.iter().copied(), &[], |columns| self.state.left(fit, number, columns));
             let mut sums = vec![0.0; left.len() + 1];
@@ -293,7 +234,7 @@ impl<'a> Seen<'a> {
                 sums[row + 1] = sums[row] + left[row];
             }
             let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
-            let inside = |row: &usize| is_inside(&self.sessions[number], *row);
+            let inside = |row: &usize| (WINDOW..=left.len().saturating_sub(WINDOW)).contains(row);
             let difference = |row: usize| mean(row, row + WINDOW) - mean(row - WINDOW, row);
             (0..left.len()).map(|row| Some(row).filter(inside).map_or(0.0, difference)).collect()
         };
@@ -306,7 +247,7 @@ impl<'a> Seen<'a> {
             let sharp = || self.beyond_dwell(place) * size.signum() > (1.0 - AGREES) * size.abs() - 4.0 * self.noise;
             (size.abs() > least && sharp()).then_some((place, size.abs()))
         };
-        largest(self.rows(stays).filter_map(stands_out).collect(), known)
+        largest(self.rows().filter_map(stands_out).collect(), known)
     }
 
     /// At least 1 for a step that lasts, is sudden, and is the same in both views.
@@ -393,7 +334,8 @@ fn largest(mut found: Vec<(StepPlace, f64)>, known: &[StepPlace]) -> Vec<StepPla
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut places: Vec<StepPlace> = Vec::new();
     for (place, _) in found {
-        if places.len() < AT_ONCE && !places.iter().chain(known).any(|other| other.is_near(place)) {
+        let near = |other: &StepPlace| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
+        if places.len() < AT_ONCE && !places.iter().chain(known).any(near) {
             places.push(place);
         }
     }
@@ -432,8 +374,7 @@ mod tests {
 
     /// Sizes of the steps that last, of steps in some rows.
     fn left(steps: &[(usize, f64)]) -> Vec<f64> {
-        let step =
-            |(row, size): &(usize, f64)| (StepPlace { session: 0, row: *row, stays: Stays::ForGood }, *size, 0.1);
+        let step = |(row, size): &(usize, f64)| (StepPlace { session: 0, row: *row }, *size, 0.1);
         lasting(steps.iter().map(step).collect()).into_iter().map(|(_, size, _)| size).collect()
     }
 
@@ -457,35 +398,8 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_counter_that_is_set_right_between_sessions_is_named_and_put_right() {
-        let mut random = fastrand::Rng::with_seed(4);
-        let one = |number: usize, random: &mut fastrand::Rng| {
-            let time = || (0..2000).map(|k| 0.01 * f64::from(k));
-            let torque: Vec<f64> = time().map(|t| 20.0 * (0.8 * t + number as f64).sin()).collect();
-            let mut noise = || 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
-            let error = torque.iter().map(|torque| ARCSEC * (7.0 * torque + 30.0 * torque.signum() + noise()));
-            let mut one = session(error.collect(), torque.clone());
-            one.generator_rad = time().map(|t| 30.0 * (0.6 * t).sin()).collect();
-            one.time_s = Some(time().collect());
-            one
-        };
-        let right: Vec<Session> = (0..3).map(|number| one(number, &mut random)).collect();
-        let mut slipped = right.clone();
-        for (session, row, by) in [(0, 700, 90.0), (1, 450, 120.0), (1, 1500, 80.0), (2, 900, 100.0)] {
-            slipped[session].error_rad[row..].iter_mut().for_each(|error| *error += by * ARCSEC);
-        }
-        let mut findings = Findings::default();
-        check(&mut slipped, &Gear::of_ratio(100.0), &mut findings);
-        let found = findings.faults.iter().filter(|fault| fault.name == FaultName::EncoderIndexJump).count();
-        assert_eq!(found, 4, "{:?}", findings.faults);
-        let pairs = right.iter().zip(&slipped).flat_map(|(a, b)| a.error_rad.iter().zip(&b.error_rad));
-        let off = pairs.map(|(a, b)| (a - b).abs() / ARCSEC).fold(0.0, f64::max);
-        assert!(off < 5.0, "{off}");
-    }
-
     /// Sessions at rest but for slow waves of the generator, under a torque each. A light load leaves the flank where
-    /// it is (friction); the first session has a counter that slips once under load and is set right after it.
+    /// it is (friction); in the first session a counter slips once under load.
     fn flanks_that_friction_holds(slip_arcsec: f64) -> Vec<Session> {
         let mut random = fastrand::Rng::with_seed(11);
         let torques: [fn(f64) -> f64; 3] =
@@ -498,7 +412,7 @@ mod tests {
                 if torque.abs() > 0.9 || flank == 0.0 {
                     flank = torque.signum();
                 }
-                let slipped = if number == 0 && k >= 700 { slip_arcsec } else { 0.0 };
+                let slipped = if number > 0 || k >= 700 { slip_arcsec } else { 0.0 };
                 ARCSEC * (7.0 * torque + 40.0 * flank + slipped + noise())
             });
             let mut one = session(error.collect(), torque.clone());
@@ -514,7 +428,7 @@ mod tests {
         for slip_arcsec in [400.0, 3000.0] {
             let sessions = flanks_that_friction_holds(slip_arcsec);
             let change = (1..2000).find(|row| sessions[1].torque_n_m.as_ref().unwrap()[*row] > 0.9).unwrap();
-            let at = |session: usize, row: usize| StepPlace { session, row, stays: Stays::ToTheEnd };
+            let at = |session: usize, row: usize| StepPlace { session, row };
             let gear = Gear::of_ratio(100.0);
             let seen = Seen::of(&sessions, &gear);
             let steps = [(at(0, 700), slip_arcsec * ARCSEC, ARCSEC), (at(1, change), 80.0 * ARCSEC, ARCSEC)];
@@ -525,13 +439,6 @@ mod tests {
             let found: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
             assert_eq!(found, [700], "{:?} {:?}", findings.faults, findings.notes);
         }
-    }
-
-    #[test]
-    fn what_stands_at_the_ends_of_a_session_may_be_between_two() {
-        let session = session(vec![0.0; 400], vec![0.0; 400]);
-        let inside = |row: usize| is_inside(&session, row);
-        assert!(!inside(3) && !inside(395) && inside(WINDOW) && inside(200));
     }
 
     #[test]

@@ -177,9 +177,13 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         gear.ratio,
         1.0 / gear.ratio
     );
-    let exchanged = found / gear.ratio.powi(2);
-    if (exchanged - 1.0).abs() <= 2.5 * SAME {
-        exchange(log, &seen, findings);
+    if (found / gear.ratio.powi(2) - 1.0).abs() <= 2.5 * SAME {
+        let what = format!("{seen}: the two columns are exchanged, and were put right");
+        mismatch(log, None, Treatment::Repaired, what, findings);
+        if let (Some(a), Some(b)) = (log.take(Quantity::Generator), log.take(Quantity::Output)) {
+            log.put(Quantity::Generator, b);
+            log.put(Quantity::Output, a);
+        }
         return Ok(());
     }
     if let Some(other) = gear.other_wheel_ratio
@@ -209,28 +213,12 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         let why = "one of the two is in another unit, and no size says which for certain";
         return Err(Refusal::OtherReading { seen, why, readings });
     }
-    // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was
-    // found.
-    if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&exchanged) {
-        exchange(log, &seen, findings);
-        return Ok(());
-    }
     Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
         let (generator, output) = (generator.to_owned(), output.to_owned());
         Refusal::OutputStands { generator, output, turned: psi, followed: travel }
     } else {
         Refusal::OtherRatio { seen, factor: RATIO_ERROR[1] }
     })
-}
-
-/// Puts generator and output in each other's place.
-fn exchange(log: &mut Log, seen: &str, findings: &mut Findings) {
-    let what = format!("{seen}: the two columns are exchanged, and were put right");
-    mismatch(log, None, Treatment::Repaired, what, findings);
-    if let (Some(a), Some(b)) = (log.take(Quantity::Generator), log.take(Quantity::Output)) {
-        log.put(Quantity::Generator, b);
-        log.put(Quantity::Output, a);
-    }
 }
 
 /// Whether recorded errors have the size of errors.
