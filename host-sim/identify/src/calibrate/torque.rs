@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use flexspline::Table;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -67,14 +68,9 @@ fn held_by(loads: &[(usize, f64)], widths_n_m: Held) -> Vec<Held> {
     loads.iter().map(of_row).collect()
 }
 
-/// Zeros of the sessions and hysteresis in what a model leaves of some rows, all but those of a fold: by so many of the
-/// springs, those that slip last, of which the last never does. The output lags: a spring with which it would lead gets
-/// nothing.
-fn hysteresis_in(
-    (rows, held, widths_n_m): (&Rows, &[Held], Held),
-    (fold, model): &(Option<usize>, Model),
-    springs: usize,
-) -> Option<FitWithout> {
+/// Products of the sessions, of what the springs hold, and of the load with what a model leaves of some rows, all but
+/// those of a fold.
+fn sums(rows: &Rows, held: &[Held], fold: Option<usize>, model: &Model) -> Gram {
     const SPRINGS: usize = SLIPS.len();
     let sessions = rows.loads.last().map_or(0, |(session, _)| session + 1);
     let mut gram = Gram::none(sessions + SPRINGS + 2);
@@ -84,13 +80,20 @@ fn hysteresis_in(
         x[rows.loads[row.number].0] = 1.0;
         x[sessions..][..SPRINGS].copy_from_slice(&held[row.number]);
         x[sessions + SPRINGS..].copy_from_slice(&[row.at.torque_n_m, row.left_arcsec - model.adds_arcsec(&row.at)]);
-        gram.add_row(&x, if Some(row.fold) == *fold { LEFT_OUT } else { 1.0 });
+        gram.add_row(&x, if Some(row.fold) == fold { LEFT_OUT } else { 1.0 });
     }
-    let gram = gram.among(&(0..gram.size).collect::<Vec<usize>>());
+    gram.among(&(0..gram.size).collect::<Vec<usize>>())
+}
+
+/// Zeros of the sessions and hysteresis by such products: by so many of the springs, those that slip last, of which the
+/// last never does. The output lags: a spring with which it would lead gets nothing.
+fn hysteresis_in((gram, model): &(Gram, Model), widths_n_m: Held, springs: usize) -> Option<FitWithout> {
+    const SPRINGS: usize = SLIPS.len();
+    let sessions = gram.size - SPRINGS - 2;
     let mut priors = vec![linear::Prior { mean: 0.0, std: ANY_ARCSEC }; gram.size - 1];
     priors[sessions..][..SPRINGS + 1 - springs].iter_mut().for_each(|prior| prior.std = 0.0);
     loop {
-        let mut zeros = solve(&gram, &priors, 1.0)?.coefficients;
+        let mut zeros = solve(gram, &priors, 1.0)?.coefficients;
         let leads = (sessions..sessions + SPRINGS).filter(|k| priors[*k].std > 0.0 && zeros[*k] > 0.0);
         if let Some(most) = leads.max_by(|a, b| zeros[*a].total_cmp(&zeros[*b])) {
             priors[most].std = 0.0;
@@ -124,26 +127,27 @@ impl WindUpTorque {
         let all = folds.all();
         let widths_n_m = SLIPS.map(|share| share * low.abs().max(high.abs()));
         let held = held_by(&rows.loads, widths_n_m);
-        let with = (rows, &held[..], widths_n_m);
         let without = |fold: Option<usize>| {
             let others: Vec<usize> = all.iter().copied().filter(|other| Some(*other) != fold).collect();
             let mut zeros = folds.fit(&others, &model.chosen, &[])?;
             let coefficients = zeros.split_off(zeros.len() - model.coefficients.len());
-            Some((fold, Model { coefficients, ..model.clone() }))
+            let model = Model { coefficients, ..model.clone() };
+            Some((sums(rows, &held, fold, &model), model))
         };
         let models = (0..=*all.last()?).map(|fold| without(Some(fold))).collect::<Option<Vec<_>>>()?;
         let judged = |springs: usize, half_width_arcsec: f64| {
-            let fits = models.iter().map(|of| hysteresis_in(with, of, springs)).collect::<Option<Vec<_>>>()?;
+            let fits = models.iter().map(|of| hysteresis_in(of, widths_n_m, springs)).collect::<Option<Vec<_>>>()?;
             Some((springs, Self::judged(rows, &fits, half_width_arcsec / per_n_m, prior)))
         };
         let (_, alone) = judged(0, 0.0)?;
-        let tried = (1..=SLIPS.len() + 1).filter_map(|springs| judged(springs, alone.half_width_arcsec));
+        let tried = (1..=SLIPS.len() + 1).into_par_iter();
+        let tried = tried.filter_map(|springs| judged(springs, alone.half_width_arcsec));
         let (springs, best) = tried.min_by(|(_, a), (_, b)| a.rms_n_m.total_cmp(&b.rms_n_m))?;
         let (_, best) = judged(springs, best.half_width_arcsec)?;
         if best.rms_n_m.powi(2) >= (1.0 - LEAST_GAIN) * alone.rms_n_m.powi(2) {
             return Some(alone);
         }
-        let (.., mut hysteresis) = hysteresis_in(with, &without(None)?, springs)?;
+        let (.., mut hysteresis) = hysteresis_in(&without(None)?, widths_n_m, springs)?;
         let holds_arcsec = |of: &SlipSpring| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD;
         hysteresis.springs.retain(|spring| holds_arcsec(spring) > ROUNDING_ARCSEC);
         Some(Self { hysteresis: Some(hysteresis), ..best })
