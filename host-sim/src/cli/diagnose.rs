@@ -16,8 +16,8 @@ use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::pipeline::{
     Diagnosed, Extension, Made, PipelineError, Subject, diagnose_rows, parse_rows,
 };
-use flexspline_identify::diagnosis::report::{Compensation, Diagnosis};
-use flexspline_identify::extension::{Compensated, Model};
+use flexspline_identify::diagnosis::report::Diagnosis;
+use flexspline_identify::extension::Model;
 use flexspline_identify::measurement::{Recording, bytes_of};
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -214,26 +214,8 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     }
     let _ = writeln!(text, "{}", extension.table.text());
     text += &diagnosis.text();
-    if let Some(evaluation) = &extension.compensation {
-        text += "pointing error with each table in the core, sessions held out, arcsec rms\n";
-        text += "             sessions      rows   no table    nominal calibrated   extended\n";
-        let sessions = &evaluation.sessions;
-        let mut line = |name: String, sessions: usize, rows: usize, left: &Compensation| {
-            let calibrated = left.rms_calibrated_table_arcsec.map_or("–".to_owned(), |left| format!("{left:.2}"));
-            let _ = writeln!(
-                text,
-                "  {name:<11} {sessions:>7} {rows:>9} {:>10.2} {:>10.2} {calibrated:>10} {:>10.2}",
-                left.rms_uncompensated_arcsec, left.rms_nominal_tables_arcsec, left.rms_extended_tables_arcsec
-            );
-        };
-        line("all".to_owned(), sessions.len(), sessions.iter().map(|s| s.rows).sum(), &evaluation.left);
-        let extended = |s: &&Compensated| s.left.rms_extended_tables_arcsec;
-        if let Some(worst) = sessions.iter().max_by(|a, b| extended(a).total_cmp(&extended(b))) {
-            line(format!("worst, {}", worst.session + 1), 1, worst.rows, &worst.left);
-        }
-        for left in &evaluation.not_applied {
-            let _ = writeln!(text, "  not in the tables: {}, {}", left.cause, left.reason);
-        }
+    for left in extension.compensation.iter().flat_map(|evaluation| &evaluation.not_applied) {
+        let _ = writeln!(text, "not in the tables: {}, {}", left.cause, left.reason);
     }
     if !diagnosis.causes.is_empty() {
         for field in &extension.drive_fields {
