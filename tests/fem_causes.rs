@@ -117,7 +117,7 @@ fn diagnosed(change: impl Fn(&mut AsBuilt), seed: u64) -> Diagnosis {
     let (image, kernels) = known();
     let table = Table::check(image).unwrap();
     let nominal = Nominal { kernels: Some(Arc::clone(kernels)), ..Nominal::of_table(&table) };
-    diagnose(&measured(change, seed), &nominal, Some(&table), &Settings::default(), |_, _, _| {}).unwrap()
+    diagnose(&measured(change, seed), &nominal, Some(&table), &Settings::default(), |_, _, _| {}).unwrap().0
 }
 
 /// The cause is named alone and first, and its size and phase are right.
@@ -188,7 +188,9 @@ fn an_eccentric_circular_spline_is_told_without_kernels_before_and_after_its_fla
         };
         let sessions = measured(eccentric, seed);
         let diagnosis =
-            diagnose(&sessions, &Nominal::of_table(&table), Some(&table), &Settings::default(), |_, _, _| {}).unwrap();
+            diagnose(&sessions, &Nominal::of_table(&table), Some(&table), &Settings::default(), |_, _, _| {})
+                .unwrap()
+                .0;
         println!("{size_um} um without kernels:\n{}", diagnosis.text());
         let names: Vec<&str> = diagnosis.causes.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["circular_spline_eccentricity"]);

@@ -180,7 +180,8 @@ impl Diagnose {
         for (_, table) in &mut made.tables {
             table.info.command.clone_from(&context.command);
         }
-        let toml = made.drive_toml.as_ref().map(|toml| (header(context) + toml).into_bytes());
+        let header = format!("# Written by flexspline {}: {}\n", env!("CARGO_PKG_VERSION"), context.command);
+        let toml = made.drive_toml.as_ref().map(|toml| (header + toml).into_bytes());
         let toml = toml.map(|toml| ("drive-extended.toml".to_owned(), toml));
         for (name, content) in toml.into_iter().chain(made.table_files()) {
             outputs.file(&out.join(&name), |file| file.write_all(&content))?;
@@ -199,11 +200,6 @@ fn kernels(path: &Path) -> Result<Option<Kernels>, Failure> {
     Kernels::from_json(&text).map_err(bad_file(path)).map(Some)
 }
 
-/// The first lines of a file that was written here.
-fn header(context: &Context) -> String {
-    format!("# Written by flexspline {}: {}\n", env!("CARGO_PKG_VERSION"), context.command)
-}
-
 fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out: &Path, with_page: bool) -> String {
     let mut text = format!("{}: {} rows, {} sessions\n", recording.file, recording.rows, recording.sessions.len());
     for fault in &recording.faults {
@@ -217,10 +213,8 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     for left in extension.compensation.iter().flat_map(|evaluation| &evaluation.not_applied) {
         let _ = writeln!(text, "not in the tables: {}, {}", left.cause, left.reason);
     }
-    if !diagnosis.causes.is_empty() {
-        for field in &extension.drive_fields {
-            let _ = writeln!(text, "extended drive: {field}");
-        }
+    for field in &extension.drive_fields {
+        let _ = writeln!(text, "extended drive: {field}");
     }
     let mut files = vec!["diagnosis.json".to_owned()];
     files.extend(with_page.then(|| "report.html (for any browser)".to_owned()));

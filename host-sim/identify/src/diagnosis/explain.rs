@@ -31,9 +31,6 @@ pub struct Explanation<'a> {
     /// The decision against it; none for a cause that is named.
     #[serde(skip)]
     pub stopped: Option<&'a Decision>,
-    /// Rise of the misfit with it in the place of each cause named.
-    #[serde(skip)]
-    in_place_of: Vec<(CauseName, f64)>,
 }
 
 impl<'a> Explanation<'a> {
@@ -67,12 +64,6 @@ impl<'a> Explanation<'a> {
         if named.is_none() && record.is_empty() {
             record.extend(diagnosis.experiment_for_asked.clone());
         }
-        let as_rival = |step: &&Decision| match step.gates[..] {
-            [Judged { gate: Gate::AsRival, value: Some(rise), .. }] => Some((step.against?.cause()?, rise)),
-            _ => None,
-        };
-        let is_named = |(of, _): &(CauseName, f64)| diagnosis.causes.iter().any(|found| found.name == *of);
-        let in_place_of = steps.iter().filter_map(as_rival).filter(is_named).collect();
         let because = match named {
             Some(found) => {
                 let alike = if look_alikes.is_empty() { "" } else { "; these data do not tell it from others" };
@@ -93,7 +84,6 @@ impl<'a> Explanation<'a> {
             record,
             trace,
             stopped,
-            in_place_of,
         }
     }
 
@@ -105,16 +95,8 @@ impl<'a> Explanation<'a> {
         if let (Some(evidence), Some(size)) = (self.evidence, self.size_arcsec) {
             let _ = writeln!(text, "evidence {evidence:.1}, size {size:.2} arcsec rms where it was last measured");
         }
-        for (of, rise) in &self.in_place_of {
-            let verb = if *rise < 0.0 { "lowers" } else { "raises" };
-            let rise = rise.abs();
-            let _ = writeln!(
-                text,
-                "in the place of {of} it {verb} the misfit by {rise:.0} (25 are five standard deviations)"
-            );
-        }
         let TraceEntries(steps) = &self.trace;
-        let told = steps.iter().filter(|step| step.stage != Stage::Data && !is_plain_rival(step));
+        let told = steps.iter().filter(|step| step.stage != Stage::Data);
         for (shown, step) in told.enumerate() {
             if shown == MOST_STEPS {
                 text.push_str("  ... the rest is in diagnosis.json under trace\n");
@@ -138,11 +120,6 @@ impl<'a> Explanation<'a> {
 
 /// Steps on a screen. *Guess*: each takes a few of the 24 lines of a terminal.
 const MOST_STEPS: usize = 6;
-
-/// A rival that neither tells better nor looks alike says nothing on a screen.
-fn is_plain_rival(step: &Decision) -> bool {
-    step.stage == Stage::Rival && (step.passed() || step.gates.iter().any(|judged| judged.gate == Gate::AsRival))
-}
 
 /// `found 0.82, asked for more than 1.50`.
 #[must_use]

@@ -120,27 +120,14 @@ pub(crate) const LEAST_ROWS: usize = 200;
 const AVERAGES: usize = 12_000;
 /// Times that causes are chosen again, at most.
 const MOST_ROUNDS: usize = 2;
-/// Diagnoses sessions against a nominal model, or against a table of the FEM that takes its place in the prediction.
+/// Diagnoses sessions against a nominal model, or against a table of the FEM that takes its place in the prediction;
+/// gives the model that was found as well, to predict other rows with.
 ///
 /// `progress(done, of, what)` is told how far it is.
 ///
 /// # Errors
 /// Too few rows; numbers that are not finite.
 pub fn diagnose(
-    sessions: &[Session],
-    nominal: &Nominal,
-    table: Option<&Table<'_>>,
-    settings: &Settings<'_>,
-    progress: impl FnMut(usize, usize, &str),
-) -> Result<Diagnosis, DiagnosisError> {
-    diagnose_extended(sessions, nominal, table, settings, progress).map(|(diagnosis, _)| diagnosis)
-}
-
-/// Diagnoses, and gives the model that was found, to predict other rows with.
-///
-/// # Errors
-/// As [`diagnose`].
-pub(crate) fn diagnose_extended(
     sessions: &[Session],
     nominal: &Nominal,
     table: Option<&Table<'_>>,

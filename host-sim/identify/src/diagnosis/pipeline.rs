@@ -1,7 +1,7 @@
 //! From a file of measured rows to a verdict, the extended drive and its tables: what the command `diagnose` computes.
 //!
 //! ```text
-//! file -> Recording -> less what the model knows -> diagnose_extended -> Diagnosis, Extended
+//! file -> Recording -> less what the model knows -> diagnose -> Diagnosis, Extended
 //!                                                                            |
 //!         tables worth it? <- evaluate (sessions held out, read by the core) +-> drive-extended.toml
 //! ```
@@ -17,7 +17,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::report::{Cause, Diagnosis};
-use super::{DiagnosisError, Extended, Settings, diagnose_extended};
+use super::{DiagnosisError, Extended, Settings, diagnose};
 use super::{channels, torque_zero, zeros};
 use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrated_table, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
@@ -330,9 +330,7 @@ pub fn diagnose_rows(
     let settings = Settings { pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(), ..*settings };
     let (nominal, table) = subject.against();
     let (mut diagnosis, extended) =
-        diagnose_extended(&recording.sessions, nominal, table, &settings, |done, of, what| {
-            progress(done, of + 1, what)
-        })?;
+        diagnose(&recording.sessions, nominal, table, &settings, |done, of, what| progress(done, of + 1, what))?;
     zeros::tell(&mut recording, &diagnosis.zeros);
     if recording.unusable.is_some() {
         // What makes them unusable is a channel that had to be left out.

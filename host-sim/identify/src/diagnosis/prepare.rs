@@ -403,15 +403,6 @@ pub fn noise(
         next.dedup();
         next.retain(|k| !asked[*k]);
     }
-    // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks
-    // over, which a wander that follows everything would hide.
-    let restless = on.unloaded()
-        && hypotheses[best].wander >= MOST_WANDER * white
-        && hypotheses[best].correlation_s <= FASTEST_S * unit;
-    if restless {
-        best = hypotheses.len() - 1;
-        judged[best] = judge_under(Whitener::new(rows, &uncertain, stride, hypotheses[best]));
-    }
     let worth = judged[best].as_ref().map_or(1.0, |judged| worth_of(&judged.innovations, &judged.whitener));
     (hypotheses[best], worth)
 }

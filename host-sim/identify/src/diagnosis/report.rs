@@ -353,7 +353,7 @@ mod tests {
         };
         let sessions: Vec<_> = (0..3).map(session).collect();
         let settings = crate::diagnosis::Settings::default();
-        let found = crate::diagnosis::diagnose(&sessions, &nominal, None, &settings, |_, _, _| {}).unwrap();
+        let found = crate::diagnosis::diagnose(&sessions, &nominal, None, &settings, |_, _, _| {}).unwrap().0;
         let after = |rms_after_arcsec, extended, calibrated, applied: &[CauseName]| {
             let left = Compensation {
                 rms_uncompensated_arcsec: 90.0,

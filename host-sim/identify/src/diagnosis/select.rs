@@ -95,12 +95,6 @@ pub(crate) struct Standing {
     pub left_out: f64,
 }
 
-/// Evidence by which something without a name has to be ahead of a cause, if there is one, where that gains so much: by
-/// more than its law may be wrong by.
-fn unnamed_ahead(cause: Option<&Law>, gain: f64) -> f64 {
-    UNNAMED_AHEAD.max(cause.map_or(0.0, |law| law.wrong.misfit.powi(2)) * gain)
-}
-
 /// Whether a fitted term makes sense.
 pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
     passed(&sense(term, coefficients))
@@ -561,9 +555,10 @@ impl<'l> Chooser<'_, '_, 'l> {
         contenders_settled(problem, &mut grown, before);
         // Something with a name goes before something without unless that is clearly better.
         let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
-        let best_named = best_named.map(|(_, next)| next.newest().law);
+        // It has to be ahead by more than the law of the cause may be wrong by.
+        let wrong = best_named.map_or(0.0, |(_, next)| next.newest().law.wrong.misfit.powi(2));
         let ahead = |(gain, next): &Grown<'l>| {
-            gain - if next.newest().law.named() { 0.0 } else { unnamed_ahead(best_named, *gain) }
+            gain - if next.newest().law.named() { 0.0 } else { UNNAMED_AHEAD.max(wrong * gain) }
         };
         grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
         let standings = standings(problem, selected);

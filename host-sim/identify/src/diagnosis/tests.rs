@@ -47,7 +47,7 @@ fn recorded(effects: &[&str], sessions: usize, rows: usize, rate_hz: f64, white:
 }
 
 fn diagnosed(effects: &[&str], seed: u64) -> Diagnosis {
-    diagnose(&data(effects, seed), &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap()
+    diagnose(&data(effects, seed), &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0
 }
 
 /// Causes named, by the alphabet.
@@ -163,7 +163,7 @@ fn behind_a_low_pass(nominal: &Nominal) -> Vec<Session> {
 fn an_output_behind_a_low_pass_is_read_late_and_has_no_drag() {
     let nominal = Nominal { backlash_arcsec: 0.0, ..catalogue_drive() };
     let sessions = behind_a_low_pass(&nominal);
-    let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&diagnosis), [CauseName::SensorLatency], "{}", diagnosis.text());
     let said = diagnosis.causes[0].parameters["delay_s"];
     // What such a filter is late by at a steady pace.
@@ -176,7 +176,7 @@ fn an_output_that_takes_milliseconds_to_its_other_flank_is_a_perfect_drive() {
     let nominal = catalogue_drive();
     for lag_s in [2e-3, 5e-3, 10e-3, 20e-3] {
         let sessions = slow_to_its_other_flank(&nominal, lag_s);
-        let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap().0;
         assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{lag_s}: {}", diagnosis.text());
         let said = diagnosis.recalibrated[super::base::CHANGE_OF_FLANK];
         assert!((said.value - lag_s).abs() < 3.0 * said.std + 0.3 * lag_s, "{said:?} for {lag_s}");
@@ -192,7 +192,7 @@ fn a_ring_held_in_three_jaws_hides_no_other_line_of_the_output() {
         (CauseName::RatioError, "ratio_error:ratio_relative_error=3.6e-5", 42),
     ] {
         let sessions = with_more(data(&[hidden], seed), third);
-        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
         assert_eq!(names(&diagnosis), [cause], "{}", diagnosis.text());
         assert!(!diagnosis.unexplained.is_empty(), "{}", diagnosis.text());
     }
@@ -218,7 +218,7 @@ fn wear_goes_on_while_nobody_records() {
             *error += 0.5 * wider * flank / ARCSEC_PER_RAD;
         }
     }
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&diagnosis), [CauseName::Wear], "{}", diagnosis.text());
     let growth = diagnosis.causes[0].parameters[ParameterName::GrowthArcsec.as_str()];
     assert!((growth.value - 40.0).abs() < 3.0 * growth.std + 2.0 && growth.std < 3.0, "{growth:?}");
@@ -243,7 +243,7 @@ fn what_swings_short_of_where_it_is_driven_is_no_resonance() {
                 *error += gain * (off - driven) / ARCSEC_PER_RAD;
             }
         }
-        let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap().0;
         let named = names(&diagnosis).contains(&CauseName::TorsionalResonance);
         assert_eq!(named, resonates, "{gain}: {}", diagnosis.text());
     }
@@ -275,7 +275,7 @@ fn a_line_that_grows_with_the_speed_is_no_encoder_and_one_that_does_not_is() {
     let plain = recorded(&[], 5, 3000, 100.0, 1.0, 61);
     let with_encoder = with_more(plain.clone(), |psi, _, _| 4.0 * (order * psi + 0.3).sin());
     let of = |sessions: &[Session]| {
-        diagnose(sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap()
+        diagnose(sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0
     };
     let diagnosis = of(&with_encoder);
     assert_eq!(names(&diagnosis), [CauseName::EncoderSubdivision], "{}", diagnosis.text());
@@ -304,7 +304,7 @@ fn a_coupling_before_the_generator_that_gives_way_is_no_soft_spring_with_a_late_
     let sessions = with_more_by_speed(recorded(&[], 5, 3000, 100.0, 1.5, 71), |torque, speed| {
         0.5 * torque - 4.0 * still(speed) - 0.7 * speed
     });
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{}", diagnosis.text());
     let coupling = |left: &super::Unexplained| left.looks_like.contains("a coupling before the generator");
     assert!(diagnosis.unexplained.iter().any(coupling), "{}", diagnosis.text());
@@ -317,7 +317,7 @@ fn a_higher_harmonic_of_the_pitch_is_found_and_not_sure_where_the_wheel_stands()
     for order in [4.0, 6.0] {
         let wave = |psi: f64, _: f64, _: usize| 9.0 * (order * psi + 0.4).sin();
         let sessions = with_more(recorded(&[], 5, 3000, 100.0, 1.5, 72), wave);
-        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
         let pitch = CauseName::FlexsplinePitchError;
         let [cause] = &diagnosis.causes[..] else { panic!("{}", diagnosis.text()) };
         assert!(cause.name == pitch || cause.look_alikes == [pitch], "{}", diagnosis.text());
@@ -334,7 +334,7 @@ fn a_higher_harmonic_of_the_pitch_is_found_and_not_sure_where_the_wheel_stands()
 fn what_a_load_makes_that_nobody_recorded_has_no_name() {
     let mut sessions = with_more_by_speed(recorded(&[], 5, 3000, 100.0, 1.5, 73), |_, speed| -12.0 * speed.signum());
     sessions.iter_mut().for_each(|session| session.torque_n_m = None);
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert!(names(&diagnosis).iter().all(|name| !name.spec().made_by_loads), "{}", diagnosis.text());
 }
 
@@ -378,7 +378,7 @@ fn bad_rows_move_no_line_by_more_than_its_interval() {
         let sessions = data(&[hidden], 100);
         let found = |share: f64| {
             let rows = with_bad_rows(&sessions, share, number.is_multiple_of(2), 0);
-            let diagnosis = diagnose(&rows, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+            let diagnosis = diagnose(&rows, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
             assert_eq!(names(&diagnosis), [cause], "{share}: {}", diagnosis.text());
             diagnosis.causes[0].parameters[parameter]
         };
@@ -437,7 +437,7 @@ fn what_no_cause_explains_is_not_named() {
             let more: Vec<f64> = (0..session.len()).map(|k| strange(session, k) / ARCSEC_PER_RAD).collect();
             session.error_rad.iter_mut().zip(more).for_each(|(error, more)| *error += more);
         }
-        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
         let found = (diagnosis.verdict, names(&diagnosis));
         assert_eq!(found, (Verdict::Unknown, vec![]), "{number}: {}", diagnosis.text());
         assert!(!diagnosis.unexplained.is_empty());
@@ -449,7 +449,7 @@ fn at_one_orientation_a_side_load_and_a_runout_are_look_alikes() {
     let plan = MotionPlan { speed_rad_s: 0.9, ..PLAN };
     let mut sessions = measure(&catalogue_drive(), &[RUNOUT], &plan, &SENSORS, 5);
     sessions.iter_mut().for_each(|session| session.orientation_rad = None);
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
     let cause = &diagnosis.causes[0];
     let either = [CauseName::FlexsplineRunout, CauseName::GravitySideLoad];
     assert!(either.contains(&cause.name), "{}", diagnosis.text());
@@ -460,18 +460,18 @@ fn at_one_orientation_a_side_load_and_a_runout_are_look_alikes() {
 #[test]
 fn data_that_say_nothing_are_refused() {
     let nominal = catalogue_drive();
-    let refused = diagnose(&[], &nominal, None, &Settings::default(), |_, _, _| {}).unwrap_err();
+    let refused = diagnose(&[], &nominal, None, &Settings::default(), |_, _, _| {}).err().unwrap();
     assert_eq!(refused, DiagnosisError::TooFewRows { found: 0, needed: 200 });
     let mut sessions = data(&[], 1);
     sessions[2].error_rad[77] = f64::NAN;
-    let refused = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap_err();
+    let refused = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).err().unwrap();
     assert_eq!(refused, DiagnosisError::NotFinite);
     // Finite, but their squares are not: no hypothesis of the noise can be judged.
     let mut sessions = data(&[], 1);
     for (k, error) in sessions.iter_mut().flat_map(|s| &mut s.error_rad).enumerate() {
         *error = if k % 2 == 0 { 1e200 } else { -1e200 };
     }
-    let refused = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap_err();
+    let refused = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).err().unwrap();
     assert_eq!(refused, DiagnosisError::NotFinite);
 }
 
@@ -480,7 +480,7 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
     let sessions = data(&[LOOP, "sensor_latency:delay_s=0.002"], 31);
     let nominal = catalogue_drive();
     let used = [true, false, true, false, true];
-    let (_, all) = super::diagnose_extended(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let (_, all) = super::diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
     let extended = all.fit_to(&sessions, &used, &nominal, None).unwrap();
     assert_eq!(extended.causes().len(), 2);
     let series = extended.predict(&sessions, &nominal, None);
@@ -510,8 +510,7 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
 #[test]
 fn rows_without_a_change_of_flank_are_predicted_as_they_are_among_others() {
     let (sessions, nominal) = (data(&[], 31), catalogue_drive());
-    let (_, extended) =
-        super::diagnose_extended(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let (_, extended) = super::diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
     let rows = |of: fn(usize) -> f64| (0..200).map(of).collect::<Vec<f64>>();
     let others = [30.0, nominal.temperature_c, 0.0].map(|value| vec![value; 200]);
     let steady = Session::imagined(rows(|k| 1e5 + 0.01 * k as f64), rows(|k| 0.05 * k as f64), others);
@@ -540,7 +539,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
     let measured = |effects: &[&str]| recorded(effects, 5, 6000, 100.0, 2.0, 5);
     let cam = measured(&["cam_form_error:amplitude_arcsec=4,phase_rad=0.7"]);
     assert_eq!(rows_to_an_average(&cam), 1);
-    let diagnosis = diagnose(&cam, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&cam, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Explained, vec![CauseName::CamFormError]));
     for other in [
         vec![],
@@ -573,7 +572,7 @@ fn a_line_too_fast_for_means_of_a_long_record_is_told_with_its_size() {
         let mut sessions = recorded(&[], 1, 36_000, 100.0, 1.0, 11);
         let Session { generator_rad, error_rad, .. } = &mut sessions[0];
         error_rad.iter_mut().zip(generator_rad).for_each(|(e, psi)| *e += 3.0 / 206_264.8 * (order * *psi).sin());
-        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
         let left = &diagnosis.unexplained;
         let told = left.iter().find(|left| left.looks_like.contains("generator turn")).map(|left| left.size_arcsec);
         assert!(told.is_some_and(|size| (1.9..2.4).contains(&size)), "{order}: {}", diagnosis.text());
@@ -589,7 +588,7 @@ fn a_tooth_mesh_is_seen_behind_what_is_larger() {
         "cam_form_error:amplitude_arcsec=2.5,phase_rad=0.7",
     ];
     let measured = recorded(&effects, 5, 6000, 100.0, 2.0, 6);
-    let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&diagnosis), [CauseName::CamFormError, CauseName::DamagedTooth], "{}", diagnosis.text());
 }
 
@@ -604,7 +603,7 @@ fn teeth_that_slide_into_the_next_space_between_two_recordings_have_ratcheted() 
     }
     sessions[2].error_rad.iter_mut().enumerate().for_each(|(k, error)| *error -= pitch + slide(k));
     sessions[3].error_rad.iter_mut().for_each(|error| *error -= 2.0 * pitch);
-    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(
         (diagnosis.verdict, names(&diagnosis)),
         (Verdict::Explained, vec![CauseName::Ratcheting]),
@@ -627,7 +626,7 @@ fn teeth_that_climb_while_the_wave_passes_have_ratcheted() {
         session.error_rad[k] += pitch * f64::min(climbed, 1.0);
     }
     sessions[2].error_rad.iter_mut().for_each(|error| *error += pitch);
-    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&diagnosis), [CauseName::Ratcheting], "{}", diagnosis.text());
     let slipped = diagnosis.causes[0].parameters["jump_arcsec"];
     assert!((slipped.value - pitch * 206_264.8).abs() < 15.0, "{slipped:?}");
@@ -675,7 +674,7 @@ fn a_clearance_that_shuts_is_found_beside_a_runout_that_binds_in_it() {
             session.error_rad[k] += (rests - flank * half) / 206_264.8;
         }
     }
-    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     // At one orientation a push of gravity is the same law.
     let found = names(&diagnosis);
     let either =
@@ -713,7 +712,7 @@ fn what_lags_behind_the_temperature_goes_on_between_sessions() {
             session.error_rad[k] += flank * 0.5 * per_k * (felt - drive.temperature_c) / 206_264.8;
         }
     }
-    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&diagnosis), [CauseName::ThermalClearance], "{}", diagnosis.text());
     let found = &diagnosis.causes[0].parameters;
     assert!((found["clearance_arcsec_per_k"].value - per_k).abs() < 0.1, "{found:?}");
@@ -726,7 +725,7 @@ fn a_sensor_put_back_elsewhere_before_each_session_is_told_of_the_data_and_the_d
     for (session, zero) in sessions.iter_mut().zip([0.0, 14.0, -9.0, 21.0, 6.0]) {
         session.error_rad.iter_mut().for_each(|error| *error += zero / 206_264.8);
     }
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{}", diagnosis.text());
     assert!(diagnosis.unexplained.is_empty(), "{}", diagnosis.text());
     for (found, zero) in diagnosis.zeros.iter().zip([0.0, 14.0, -9.0, 21.0, 6.0]) {
@@ -737,7 +736,7 @@ fn a_sensor_put_back_elsewhere_before_each_session_is_told_of_the_data_and_the_d
     for session in &mut sessions[2..] {
         session.error_rad.iter_mut().for_each(|error| *error += pitch);
     }
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert!(diagnosis.verdict != Verdict::None && diagnosis.zeros.is_empty(), "{}", diagnosis.text());
 }
 
@@ -751,7 +750,7 @@ fn a_line_of_the_mains_close_to_half_the_rate_of_rows_is_seen() {
             *error += hum / ARCSEC_PER_RAD;
         }
     }
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{}", diagnosis.text());
     let seen = |left: &super::report::Unexplained| left.looks_like.starts_with("line of 49.8");
     assert!(diagnosis.unexplained.iter().any(seen), "{}", diagnosis.text());
@@ -767,7 +766,7 @@ fn unloaded(effects: &[&str], seed: u64) -> Vec<Session> {
 fn without_a_load_nothing_is_named_on_a_drive_within_its_spread() {
     let drive = catalogue_drive();
     for seed in 0..3 {
-        let diagnosis = diagnose(&unloaded(&[], seed), &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&unloaded(&[], seed), &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
         assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{seed}: {}", diagnosis.text());
     }
 }
@@ -778,7 +777,7 @@ fn a_moment_that_turns_flanks_over_without_a_load_is_found_and_measured() {
     for (moment, phase, seed) in [(3.0, 1.0, 1), (6.0, 4.0, 2)] {
         let hidden = format!("gravity_torque:torque_n_m={moment},phase_rad={phase}");
         let sessions = unloaded(&[&hidden], seed);
-        let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+        let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
         assert_eq!(names(&diagnosis), [CauseName::GravityTorque], "{moment} N·m: {}", diagnosis.text());
         let found = diagnosis.causes[0].parameters["torque_n_m"];
         assert!((found.value / moment - 1.0).abs() < 0.15, "{found:?} for {moment}");
@@ -792,7 +791,7 @@ fn a_small_moment_beside_a_load_is_found_where_the_load_crosses_none() {
     // later.
     let small = ["gravity_torque:torque_n_m=0.12,phase_rad=1"];
     let sessions = recorded(&small, 5, 12000, 100.0, 1.0, 3);
-    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&diagnosis), [CauseName::GravityTorque], "{}", diagnosis.text());
     let found = diagnosis.causes[0].parameters["torque_n_m"];
     assert!((found.value - 0.12).abs() < 3.0 * found.std, "{found:?}");
@@ -1037,7 +1036,7 @@ fn a_wheel_is_told_from_the_other_whichever_of_them_stands() {
         for cause in wheels {
             let hidden = format!("{cause}:amplitude_arcsec=15,phase_rad=0.7");
             let measured = measure(&drive, &[&hidden], &PLAN, &SENSORS, 44);
-            let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+            let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
             // That of the wheel that stands is an encoder's wave, too: the odds are shared.
             let [found] = diagnosis.causes.as_slice() else { panic!("{fixed} stands: {}", diagnosis.text()) };
             let said: Vec<CauseName> = std::iter::once(found.name).chain(found.look_alikes.iter().copied()).collect();
@@ -1245,7 +1244,7 @@ fn a_zero_that_is_set_in_each_session_hides_no_cause() {
         session.error_rad.iter_mut().for_each(|error| *error += zero);
     }
     let found =
-        super::diagnose(&sessions, &catalogue_drive(), None, &super::Settings::default(), |_, _, _| {}).unwrap();
+        super::diagnose(&sessions, &catalogue_drive(), None, &super::Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&found), [CauseName::CircularSplineEccentricity]);
     assert!(found.unexplained.iter().all(|left| left.looks_like != "another zero in each session"));
     assert!((found.zeros[3].value - 130.0).abs() < 5.0, "{:?}", found.zeros);
@@ -1284,7 +1283,7 @@ fn an_output_that_hangs_in_the_clearance_is_no_cause() {
     let drive = catalogue_drive();
     let effects = ["output_encoder_eccentricity:amplitude_arcsec=15,phase_rad=0.7"];
     let sessions = hanging(recorded(&effects, 5, 6000, 100.0, 2.0, 5), &drive);
-    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
     assert_eq!(names(&diagnosis), [CauseName::OutputEncoderEccentricity], "{}", diagnosis.text());
 }
 

@@ -349,11 +349,6 @@ fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Kno
     Some(Judged::below(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH))
 }
 
-fn is_subdivision_of_output(cause: Option<CauseName>, known: &Known) -> bool {
-    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
-    cause == Some(CauseName::EncoderSubdivision) && at_output
-}
-
 /// Noise of an average, wander with it, arcsec.
 fn floor(problem: &Problem<'_>, noise: Noise) -> f64 {
     let rows_of_an_average = problem.on.rows.count_used() as f64 / problem.data.len() as f64;
@@ -383,8 +378,9 @@ fn outside(
 ) -> Option<&'static str> {
     let nominal = problem.on.nominal;
     let standing = standing_pitch_error(nominal);
-    let part_of_a_turn =
-        is_subdivision_of_output(Some(name), known) && problem.on.output_span_rad() < std::f64::consts::TAU;
+    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
+    let is_subdivision = name == CauseName::EncoderSubdivision && at_output;
+    let part_of_a_turn = is_subdivision && problem.on.output_span_rad() < std::f64::consts::TAU;
     let not_held_against_it = nominal.teeth.is_none()
         || name == CauseName::EncoderSubdivision
         || but(&selected.terms, k).any(|other| other.law.is(standing));
