@@ -70,8 +70,7 @@ impl Plan<'_> {
         bend
     }
 
-    /// The equation of a sample; `kept` has its cosines and sines from the first time on, if there is room for them: NaN
-    /// before.
+    /// The equation of a sample; `kept` has its cosines and sines from the first time on, NaN before.
     pub(super) fn row(&self, sample: &Sample, slopes: &Slopes, kept: Option<&mut [f64]>) -> SampleRow {
         let generator = GeneratorAngle::from_rad(sample.generator_rad).unwrap_or_default();
         let phases = self.drive.phases(generator, self.drive.nominal_output(generator));

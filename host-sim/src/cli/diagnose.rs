@@ -25,10 +25,11 @@ use flexspline_mechanics::drive::GeneratorKind;
 ///
 /// Reads a CSV with a generator angle and an output angle (or error_arcsec), if wanted time_s, torque_n_m,
 /// temperature_c and orientation_rad; writes diagnosis.json. The nominal model is a catalogue's (--model), that of a
-/// table (--tables), or of the ratio alone (--ratio) with wind-up and backlash fitted to the same rows. Where causes are found it writes drive-extended.toml, to be given again as the input was: with
-/// --model in the place of a nominal.toml, or with --drive beside --tables. Of two tables it writes the one that leaves
-/// less error in rows that took no part, if it leaves less than the nominal one and none: that of the causes as
-/// <G>-extended.fxt, that of a calibration of the same rows as calibrated.fxt, each with .json, .rs and .h.
+/// table (--tables), or of the ratio alone (--ratio) with wind-up and backlash fitted to the same rows. Where causes
+/// are found it writes drive-extended.toml, to be given again as the input was: with --model in the place of a
+/// nominal.toml, or with --drive beside --tables. Of two tables it writes the one that leaves less error in rows that
+/// took no part, if it leaves less than the nominal one and none: that of the causes as <G>-extended.fxt, that of a
+/// calibration of the same rows as calibrated.fxt, each with .json, .rs and .h.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\

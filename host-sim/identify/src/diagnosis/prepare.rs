@@ -331,8 +331,8 @@ impl FreeColumns {
     }
 }
 
-/// Directions in which free columns add more than this to a row, arcsec, say as much as all of them: the least white
-/// noise that is taken.
+/// Directions in which free columns add more than this to a row, arcsec, say as much as all of them. *Source*: the
+/// least white noise that is taken ([`white_level`]).
 const LEAST_ADDED: f64 = 1e-3;
 
 /// Columns, each with a coefficient of unit variance, as fewer that add the same: the principal components. Laws at
