@@ -230,7 +230,7 @@ pub fn diagnose<'py>(
             KnownFrom::Image(image) => Subject::of_table(image, drive.clone(), kind).map_err(PythonFailure::bad)?,
             KnownFrom::Ratio(ratio) => {
                 let (name, bytes) = log.bytes().map_err(PythonFailure::bad)?;
-                Subject::of_ratio(*ratio, (drive.clone(), kind), (&name, bytes, &map)).map_err(failed)?
+                Subject::of_ratio(*ratio, (drive.clone(), kind), (&name, bytes.into_owned(), &map)).map_err(failed)?
             }
         };
         let subject = match &kernels {

@@ -127,6 +127,8 @@ def test_diagnose_is_the_command(log_file: Path, tmp_path: Path) -> None:
         assert found.extended_table.image == (tmp_path / found.table.file).read_bytes()
     again = flexspline.diagnose(log_file, model=tmp_path / "ours/drive-extended.toml")
     assert again.finding == "nothing_found", "the extended model holds the cause"
+    by_ratio = flexspline.diagnose(log_file, ratio=-100)
+    assert by_ratio.table.file is not None and by_ratio.json["held_out"]["rms_before_arcsec"] > 0
 
 
 def test_columns_in_memory_are_the_file(log_file: Path) -> None:

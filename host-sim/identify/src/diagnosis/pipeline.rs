@@ -601,6 +601,31 @@ mod tests {
         assert!(!notes.iter().any(|note| note.contains("judge by")), "{notes:?}");
     }
 
+    /// A ratio alone: wind-up and play are those of the rows, and the wave that is left has its order.
+    #[test]
+    fn a_ratio_alone_takes_the_spring_from_the_rows() {
+        let nominal = catalogue_drive();
+        let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
+        let mut random = fastrand::Rng::with_seed(8);
+        for k in 0..12_000 {
+            let (psi, load) = (0.05 * f64::from(k), 30.0 * (f64::from(k) / 300.0).sin());
+            let flank = 0.5 * nominal.backlash_arcsec * load.signum();
+            let error = nominal.wind_up_arcsec(load) + flank + 30.0 * (2.0 * psi + 0.4).sin() + 2.0 * random.f64();
+            text += &format!("{:.2},{psi:.6},{error:.4},{load:.4}\n", 0.01 * f64::from(k));
+        }
+        let (drive, columns) = ((Drive::hhd_95(), GeneratorKind::Cam), ColumnMap::default());
+        let subject = Subject::of_ratio(95.0, drive, ("gear.csv", text.clone().into_bytes(), &columns)).unwrap();
+        let spring = |of: &Nominal| of.wind_up_arcsec(25.0) - of.wind_up_arcsec(10.0);
+        let (found, true_one) = (spring(&subject.nominal), spring(&nominal));
+        assert!((found / true_one - 1.0).abs() < 0.05, "{found} for {true_one}");
+        let rows = parse_rows("gear.csv", text.as_bytes(), &columns, &subject).unwrap();
+        let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
+        let said = done.diagnosis.text();
+        assert!(said.contains("generator_encoder_tilt (50 %)") && said.contains("the gear's own wheels"), "{said}");
+        let other = Subject::of_ratio(1.0, (Drive::hhd_95(), GeneratorKind::Cam), ("g.csv", Vec::new(), &columns));
+        assert!(other.err().unwrap().to_string().starts_with("--ratio: found 1, allowed: 2 to 10000"));
+    }
+
     /// A model that holds a tilt of the output's encoder: a calibration has it neither in its rows nor in its table.
     #[test]
     fn the_output_encoders_error_is_taken_from_the_rows_of_a_calibration() {
