@@ -93,9 +93,8 @@ impl Plan<'_> {
             nodes.into_iter().zip(weights).map(move |(node, share)| (base + node, weight * share as f64))
         });
         row.ripple.iter_mut().zip(pairs).for_each(|(to, from)| *to = from);
-        let known = kept.as_ref().is_some_and(|kept| kept.first().is_some_and(|value| !value.is_nan()));
-        if let Some(kept) = kept.as_ref().filter(|_| known) {
-            row.harmonics.iter_mut().zip(kept.iter()).for_each(|(to, from)| *to = *from);
+        if let Some(kept) = kept.as_deref().filter(|kept| kept.first().is_some_and(|value| !value.is_nan())) {
+            row.harmonics.iter_mut().zip(kept).for_each(|(to, from)| *to = *from);
             return row;
         }
         let parts =

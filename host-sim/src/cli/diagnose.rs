@@ -18,7 +18,7 @@ use flexspline_identify::diagnosis::pipeline::{
 };
 use flexspline_identify::diagnosis::report::Diagnosis;
 use flexspline_identify::extension::Model;
-use flexspline_identify::measurement::{Recording, bytes_of};
+use flexspline_identify::measurement::{ColumnMap, Recording, bytes_of};
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
@@ -83,13 +83,7 @@ impl Diagnose {
         let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
         let failed = |error: PipelineError| self.failed(&error);
         let (file, bytes) = bytes_of(&self.data).map_err(bad_input)?;
-        let subject = match self.ratio {
-            Some(ratio) => {
-                let log = (file.as_str(), bytes.clone(), &map);
-                Subject::of_ratio(ratio, (context.drive()?, self.generator), log).map_err(failed)?
-            }
-            None => self.subject(context, image.as_ref())?,
-        };
+        let subject = self.subject(context, image.as_ref(), (&file, &bytes, &map))?;
         let recording = parse_rows(&file, bytes, &map, &subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
@@ -157,7 +151,12 @@ impl Diagnose {
     }
 
     /// The drive that the rows are of; `image` is the table that was asked for, with its file.
-    fn subject<'i>(&self, context: &Context, image: Option<&'i (PathBuf, Vec<u8>)>) -> Result<Subject<'i>, Failure> {
+    fn subject<'i>(
+        &self,
+        context: &Context,
+        image: Option<&'i (PathBuf, Vec<u8>)>,
+        (file, bytes, map): (&str, &[u8], &ColumnMap),
+    ) -> Result<Subject<'i>, Failure> {
         let drive = context.drive()?;
         match (&self.model, image) {
             (Some(path), _) => {
@@ -172,7 +171,11 @@ impl Diagnose {
                     None => Ok(subject),
                 }
             }
-            (None, None) => Err(Failure::BadInput("expected --model, --tables or --ratio".to_owned())),
+            (None, None) => {
+                let log = (file, bytes.to_vec(), map);
+                let subject = Subject::of_ratio(self.ratio.unwrap_or_default(), (drive, self.generator), log);
+                subject.map_err(|error| self.failed(&error))
+            }
         }
     }
 

@@ -51,11 +51,14 @@ pub struct WindUpTorque {
     pub hysteresis: Option<Hysteresis>,
 }
 
+/// Springs.
+const SPRINGS: usize = SLIPS.len();
+
 /// A number for each spring.
-type Held = [f64; SLIPS.len()];
+type Held = [f64; SPRINGS];
 
 /// A fit to all folds but one: zeros of the sessions, arcsec, the model, and what it does not have.
-type FitWithout = (Vec<f64>, Model, Hysteresis);
+type FitWithout<'m> = (Vec<f64>, &'m Model, Hysteresis);
 
 /// What the springs hold in each row by the torque recorded, N·m.
 fn held_by(loads: &[(usize, f64)], widths_n_m: Held) -> Vec<Held> {
@@ -71,7 +74,6 @@ fn held_by(loads: &[(usize, f64)], widths_n_m: Held) -> Vec<Held> {
 /// Products of the sessions, of what the springs hold, and of the load with what a model leaves of some rows, all but
 /// those of a fold.
 fn sums(rows: &Rows, held: &[Held], fold: Option<usize>, model: &Model) -> Gram {
-    const SPRINGS: usize = SLIPS.len();
     let sessions = rows.loads.last().map_or(0, |(session, _)| session + 1);
     let mut gram = Gram::none(sessions + SPRINGS + 2);
     let mut x = vec![0.0; gram.size];
@@ -87,8 +89,7 @@ fn sums(rows: &Rows, held: &[Held], fold: Option<usize>, model: &Model) -> Gram 
 
 /// Zeros of the sessions and hysteresis by such products: by so many of the springs, those that slip last, of which the
 /// last never does. The output lags: a spring with which it would lead gets nothing.
-fn hysteresis_in((gram, model): &(Gram, Model), widths_n_m: Held, springs: usize) -> Option<FitWithout> {
-    const SPRINGS: usize = SLIPS.len();
+fn hysteresis_in((gram, model): &(Gram, Model), widths_n_m: Held, springs: usize) -> Option<FitWithout<'_>> {
     let sessions = gram.size - SPRINGS - 2;
     let mut priors = vec![linear::Prior { mean: 0.0, std: ANY_ARCSEC }; gram.size - 1];
     priors[sessions..][..SPRINGS + 1 - springs].iter_mut().for_each(|prior| prior.std = 0.0);
@@ -103,7 +104,7 @@ fn hysteresis_in((gram, model): &(Gram, Model), widths_n_m: Held, springs: usize
         let springs = widths_n_m.into_iter().zip(&gains);
         let springs = springs.map(|(width_n_m, gain)| SlipSpring { width_n_m, gain_rad_per_n_m: gain.min(0.0) });
         let hysteresis = Hysteresis { springs: springs.collect(), gain_rad_per_n_m: gains[SPRINGS] };
-        return Some((zeros, model.clone(), hysteresis));
+        return Some((zeros, model, hysteresis));
     }
 }
 
@@ -140,14 +141,15 @@ impl WindUpTorque {
             Some((springs, Self::judged(rows, &fits, half_width_arcsec / per_n_m, prior)))
         };
         let (_, alone) = judged(0, 0.0)?;
-        let tried = (1..=SLIPS.len() + 1).into_par_iter();
+        let tried = (1..=SPRINGS + 1).into_par_iter();
         let tried = tried.filter_map(|springs| judged(springs, alone.half_width_arcsec));
         let (springs, best) = tried.min_by(|(_, a), (_, b)| a.rms_n_m.total_cmp(&b.rms_n_m))?;
         let (_, best) = judged(springs, best.half_width_arcsec)?;
         if best.rms_n_m.powi(2) >= (1.0 - LEAST_GAIN) * alone.rms_n_m.powi(2) {
             return Some(alone);
         }
-        let (.., mut hysteresis) = hysteresis_in(&without(None)?, widths_n_m, springs)?;
+        let of_all = without(None)?;
+        let (.., mut hysteresis) = hysteresis_in(&of_all, widths_n_m, springs)?;
         let holds_arcsec = |of: &SlipSpring| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD;
         hysteresis.springs.retain(|spring| holds_arcsec(spring) > ROUNDING_ARCSEC);
         Some(Self { hysteresis: Some(hysteresis), ..best })
@@ -165,7 +167,7 @@ impl WindUpTorque {
     }
 
     /// Of fits, each without the fold of its place. Springs go by torques found, by those recorded between flanks.
-    fn judged(rows: &Rows, fits: &[FitWithout], half_width_n_m: f64, prior: &Prior<'_>) -> Self {
+    fn judged(rows: &Rows, fits: &[FitWithout<'_>], half_width_n_m: f64, prior: &Prior<'_>) -> Self {
         let (mut off, mut left) = (Vec::new(), Vec::new());
         let mut now = HeldTorques { half_width_n_m, ..HeldTorques::default() };
         let mut settled = rows.rows.iter().peekable();

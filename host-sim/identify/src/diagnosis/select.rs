@@ -102,26 +102,18 @@ pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
 
 /// Whether a fitted term makes sense: its signs, and the size of its deviations.
 fn sense(term: &Term<'_>, coefficients: &[f64]) -> [Judged; 2] {
-    let [main, nuisance, _] = parts(term, coefficients);
-    let most = term.law.wrong.most_nuisance;
-    let physical = term.law.physical(&term.values(), term.by_role(coefficients));
-    [
-        Judged::plain(Gate::Sense, physical),
-        Judged { passed: nuisance <= most * main, ..Judged::below(Gate::Deviations, nuisance / main, most) },
-    ]
-}
-
-/// Root mean squares of what a term adds by its main columns, by nuisance, and beside them, arcsec.
-pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
+    // Root mean squares of what it adds by some of its columns, arcsec.
     let part = |of: fn(&Tolerance) -> bool| -> f64 {
         let only: Vec<f64> =
             term.white.tolerances.iter().zip(coefficients).map(|(t, c)| if of(t) { *c } else { 0.0 }).collect();
         super::rows::rms(&term.contribution(&only))
     };
+    let (main, nuisance) = (part(|t| matches!(t, Tolerance::Main(_))), part(|t| matches!(t, Tolerance::Nuisance(_))));
+    let most = term.law.wrong.most_nuisance;
+    let physical = term.law.physical(&term.values(), term.by_role(coefficients));
     [
-        part(|t| matches!(t, Tolerance::Main(_))),
-        part(|t| matches!(t, Tolerance::Nuisance(_))),
-        part(|t| matches!(t, Tolerance::Beside(_))),
+        Judged::plain(Gate::Sense, physical),
+        Judged { passed: nuisance <= most * main, ..Judged::below(Gate::Deviations, nuisance / main, most) },
     ]
 }
 
