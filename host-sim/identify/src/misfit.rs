@@ -20,7 +20,7 @@ const LOOKED_AT: usize = 2000;
 /// which is next to nothing beside a residual.
 pub(crate) const LEAVES: f64 = 0.7;
 /// Turns that leave less than this share more than the best are as likely. *Guess*.
-const AS_LIKELY: f64 = 1.05;
+pub(crate) const AS_LIKELY: f64 = 1.05;
 
 /// Whole turns of the motor between the generator zero of the rows and that of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -55,7 +55,8 @@ pub struct ReplayedRow {
     pub uncertainty_arcsec: f64,
     /// Quality of the prediction.
     pub quality: &'static str,
-    /// Torque that the wind-up says, with its least and its most, N m; of rows without a torque against their mean.
+    /// Torque that the wind-up says, with its least and its most, N m, infinite beyond the loads of the table; of rows
+    /// without a torque against their mean.
     pub torque_from_wind_up_n_m: f64,
     /// See above.
     pub torque_from_wind_up_low_n_m: f64,
@@ -366,22 +367,23 @@ pub fn replay(
     (replayed, summary)
 }
 
-/// Puts in the torques that the wind-up says. The intervals are of what the calibration left. Without one they are of
-/// what the table leaves of the rows; without a torque, of the noise of the rows and of what the table leaves of its
-/// samples.
+/// Puts in the torques that the wind-up says. The intervals are of what the calibration left, or of the noise of the
+/// rows if that is more. Without a calibration they are of what the table leaves of the rows; without a torque, of the
+/// noise of the rows and of what the table leaves of its samples.
 fn read_torques(
     table: &Table<'_>,
     rows: &[MeasuredRow],
     (replayed, off_arcsec): (&mut [ReplayedRow], &[f64]),
     calibrated: Option<WindUpTorque>,
 ) {
+    let errors: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
+    let noise_arcsec = white_noise([&errors[..]]);
     let half_width_arcsec = if let Some(calibrated) = &calibrated {
-        calibrated.half_width_arcsec
+        calibrated.half_width_arcsec.max(OF_95 * noise_arcsec)
     } else if rows.iter().any(|row| row.torque_n_m != 0.0) {
         quantile_of(&mut off_arcsec.to_vec(), INSIDE)
     } else {
-        let errors: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
-        OF_95 * white_noise([&errors[..]]).hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)
+        OF_95 * noise_arcsec.hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)
     };
     let hysteresis = calibrated.and_then(|calibrated| calibrated.hysteresis).unwrap_or_default();
     let torques = along(table, rows, &hysteresis, |curve, row, error_rad| {

@@ -132,8 +132,8 @@ impl<'t> WindUpCurve<'t> {
     }
 
     /// Torque of the next reading with its least and its most, N·m, where the error (output less generator over ratio,
-    /// on the zero of the table) and what the table has are right to `half_width_rad`; within the table's range. NaN
-    /// where a reading is not finite.
+    /// on the zero of the table) and what the table has are right to `half_width_rad`. The torque is within the table's
+    /// range; a least or a most that is beyond is infinite. NaN where a reading is not finite.
     pub fn read(&mut self, generator_rad: f64, error_rad: f64, temperature_c: f64, half_width_rad: f64) -> [f64; 3] {
         let [torque, low, high, _] = self.next([generator_rad, error_rad, temperature_c, half_width_rad, f64::NAN]);
         [torque, low, high]
@@ -172,12 +172,15 @@ impl<'t> WindUpCurve<'t> {
             [0.0, -1.0, 1.0].map(|end| load_of(|load| error_at(load, -end), range, error_rad + end * half_width_rad));
         let [below, above] = [1.0, -1.0].map(|end| end * (error_rad - error_at(known_n_m, end)));
         let needs = below.max(above).max(0.0).min((torque - known_n_m).abs() * per_n_m);
-        if !(torque + low + high + half + left).is_finite() {
+        if !(torque + half + left + error_rad).is_finite() {
             return [f64::NAN; 4];
         }
+        // Of loads beyond its own a table says nothing: there an interval has no end.
+        let low = if low > least_n_m { low } else { f64::NEG_INFINITY };
+        let high = if high < most_n_m { high } else { f64::INFINITY };
         self.held.follow(torque, self.hysteresis.springs.iter().map(|spring| spring.width_n_m));
         let [below, above] = [-1.0, 1.0].map(|end| torque + end * self.held.half_width_n_m);
-        [torque, low.min(below).max(least_n_m), high.max(above).min(most_n_m), needs]
+        [torque, low.min(below), high.max(above), needs]
     }
 }
 

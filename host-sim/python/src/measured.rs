@@ -165,7 +165,7 @@ pub fn calibrate<'py>(
             log.bytes().and_then(known).map_err(PythonFailure::bad)
         };
         let mut files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, PythonFailure>>()?;
-        let causes = extended.map_or(Ok(None), |subject| subject.known_before(&mut files));
+        let causes = extended.map_or(Ok(None), |subject| subject.known_before(&mut files, split));
         let causes = causes.map_err(PythonFailure::bad)?;
         let causes = causes.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PythonFailure::bad)?;
         let prior = causes.as_ref().map_or(prior, |table| Prior::of_table(table, kind));

@@ -174,7 +174,8 @@ impl Calibrate {
         }
         let subject = |model| context.drive().map(|drive| Subject::of_model(model, drive, self.generator));
         let subject = model.map(subject).transpose()?;
-        let known = subject.map_or(Ok(None), |subject| subject.known_before(&mut files)).map_err(bad_input)?;
+        let known =
+            subject.map_or(Ok(None), |subject| subject.known_before(&mut files, self.split)).map_err(bad_input)?;
         let known = known.as_ref().map(|made| table_of(Path::new("drive-extended"), &made.image)).transpose()?;
         let prior = known.as_ref().map_or(prior, |known| Prior::of_table(known, self.generator));
         let out = context.out()?;
@@ -318,7 +319,8 @@ fn held(c: &Calibration) -> String {
 fn split_text(split: &Split) -> String {
     let mut text = "of the error, arcsec rms over the rows, at the output:\n".to_owned();
     for part in &split.parts {
-        let _ = writeln!(text, "  {:<17} {:.2} ± {:.2}", part.of, part.rms_arcsec, part.half_width_arcsec);
+        let why = part.not_told.as_ref().map_or_else(String::new, |why| format!(": not told, {why}"));
+        let _ = writeln!(text, "  {:<17} {:.2} ± {:.2}{why}", part.of, part.rms_arcsec, part.half_width_arcsec);
         for w in &part.shares {
             let [least, most] = w.of_encoder.map(|share| 100.0 * share);
             let _ = writeln!(

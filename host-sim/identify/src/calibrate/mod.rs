@@ -53,7 +53,7 @@ use rows::{FoldKind, Recorded, Rows, settled};
 use split::SplitWaves;
 pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
 
-use together::{Agreement, Starts};
+use together::{Agreement, Starts, ZERO};
 pub(crate) use torque::INSIDE;
 pub use torque::WindUpTorque;
 pub(crate) use zero::Alignment;
@@ -633,7 +633,7 @@ fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<(Vec<Recording>, R
 const LEAST_START_DEG: f64 = 1.0;
 
 /// A log with each piece that has a zero of its own on the zero of a table, where its waves tell that. Whole turns
-/// stay: a motor that was homed in another turn did not start anew.
+/// stay, unless the output says them: a motor that was homed in another turn did not start anew.
 pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     let prior = Prior::of_table(table, GeneratorKind::Cam);
     let mut sessions = Vec::new();
@@ -642,9 +642,10 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         let rows = settled(std::slice::from_ref(&piece), &prior, &recorded);
         let found = (rows.rows.len() >= FEWEST_ROWS).then(|| zero::align(table, &rows, recorded.scales.friction_n_m));
         let starts_elsewhere = |found: &Alignment| {
-            let off_deg = zero::within(found.generator_zero_deg, 360.0).abs();
-            let other = off_deg > found.generator_half_width_deg + LEAST_START_DEG;
-            found.told && other && found.left_after_arcsec < LEAVES * found.left_before_arcsec
+            let deg = found.generator_zero_deg;
+            let (off_deg, leaves) = if found.by_output { (deg, 1.0) } else { (zero::within(deg, 360.0), LEAVES) };
+            let other = off_deg.abs() > found.generator_half_width_deg + LEAST_START_DEG;
+            found.told && other && found.left_after_arcsec < leaves * found.left_before_arcsec
         };
         if let Some(found) = found.filter(starts_elsewhere) {
             let zero_rad = found.generator_zero_deg.to_radians();
@@ -746,12 +747,16 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
-    readings.extend(offsets(files, &rows, &model, known.noise));
+    let offsets = offsets(files, &rows, &model, known.noise, &readings, prior.nominal.ratio);
+    readings.extend(offsets);
+    notes.extend(split.then(|| SPLIT_BY.to_owned()));
     let of_whom = |changes: Vec<(PartName, f64)>| {
         let changing = &known_with(&[&beside[..], &changes].concat())?;
         let (model, known, changes, has_torque) = (&model, &known, &changes, recorded.has_torque);
         let states: Vec<State> = some_rows().map(as_fitted).collect();
-        let (split, gear) = SplitWaves { model, known, changing, changes, has_torque }.split(&states, prior);
+        let lacking = PartName::ALL.into_iter().filter_map(|part| Some((part, recorded.lacks(part, prior)?)));
+        let lacking = lacking.collect();
+        let (split, gear) = SplitWaves { model, known, changing, changes, has_torque, lacking }.split(&states, prior);
         Ok::<_, CalibrationError>((split, table::make(prior, &gear, recorded)?))
     };
     let changes = split.then(|| split::recorded_changes(&rows, &model, prior, known.noise.rms_arcsec));
@@ -810,7 +815,9 @@ fn with_faults(error: CalibrationError, files: &[Recording], said: &[String]) ->
             CalibrationError::Known(after(format!("{}\n  then {error}", faults.join("\n  ")), said))
         }
         CalibrationError::Table(error) => CalibrationError::Known(after(error.to_string(), &[&faults, said].concat())),
-        CalibrationError::NothingGained(error) => CalibrationError::NothingGained(after(error, said)),
+        CalibrationError::NothingGained(error) => {
+            CalibrationError::NothingGained(after(error, &[&faults, said].concat()))
+        }
         other => other,
     }
 }
@@ -836,18 +843,34 @@ fn dead_zone(rows: &Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recor
     if other { usual } else { own }
 }
 
-/// The zero of the output in each file.
-fn offsets(files: &[Recording], rows: &Rows, model: &Model, noise: RowNoise) -> Vec<Reading> {
+/// How an error is split.
+const SPLIT_BY: &str = "the split takes for an encoder's what changes neither with the load nor with the flank: of \
+                        waves of displaced wheels at least half does; an error of a gear that does not counts as the \
+                        encoder's";
+
+/// The zero of the output in each file, which is known no better than that of the generator.
+fn offsets(
+    files: &[Recording],
+    rows: &Rows,
+    model: &Model,
+    noise: RowNoise,
+    zeros: &[Reading],
+    ratio: f64,
+) -> Vec<Reading> {
     let mut sums = vec![(0.0, 0.0); files.len()];
     for row in &rows.rows {
         sums[row.at.log].0 += row.left_arcsec - model.adds_arcsec(&row.at);
         sums[row.at.log].1 += 1.0;
     }
+    let by_generator = |file: &str| {
+        let zero = zeros.iter().find(|zero| zero.name == ZERO && zero.file.as_deref() == Some(file));
+        zero.map_or(0.0, |zero| zero.std.to_radians() / ratio * ARCSEC_PER_RAD)
+    };
     let offset = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| Reading {
         name: OFFSET,
         file: Some(file.file.clone()),
         value: mean + sum / f64::max(count, 1.0),
-        std: (noise.of_a_row() / f64::max(count, 1.0)).sqrt(),
+        std: (noise.of_a_row() / f64::max(count, 1.0)).sqrt().hypot(by_generator(&file.file)),
     };
     files.iter().zip(sums).zip(&rows.means_arcsec).map(offset).collect()
 }

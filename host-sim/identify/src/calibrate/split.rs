@@ -71,6 +71,9 @@ pub struct SplitPart {
     pub rms_arcsec: f64,
     /// Half width of the interval that holds it with 95 %, with what may be another part's, rms over the rows, arcsec.
     pub half_width_arcsec: f64,
+    /// Why nothing was recorded that shows its waves, where that is so: it may have any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_told: Option<String>,
     /// Its waves over the turns of the encoders.
     pub shares: Vec<WaveShare>,
 }
@@ -134,6 +137,8 @@ pub(super) struct SplitWaves<'a> {
     pub changing: &'a ModelUncertainty,
     pub changes: &'a [(PartName, f64)],
     pub has_torque: bool,
+    /// Parts that nothing was recorded of, and why.
+    pub lacking: Vec<(PartName, String)>,
 }
 
 impl SplitWaves<'_> {
@@ -175,12 +180,17 @@ impl SplitWaves<'_> {
             of,
             rms_arcsec: 0.0,
             half_width_arcsec: 0.0,
+            not_told: None,
             shares: Vec::new(),
         });
         // What may be the gear's of the waves of each encoder, mean squares.
         let mut open = [0.0; 2];
         let mut owner = vec![2; model.coefficients.len()];
         for (which, encoder) in ENCODERS.iter().enumerate() {
+            if let Some((part, why)) = self.lacking.iter().find(|(part, _)| *part == encoder.part) {
+                open[which] = (OF_95 * usual_arcsec(*part, &model.scales)).powi(2);
+                parts[which].not_told = Some(why.clone());
+            }
             for (begin, order) in model.of(encoder.part).unwrap_or(0..0).step_by(2).zip(1..) {
                 let [sine, cosine] = [0, 1].map(|k| model.coefficients[begin + k]);
                 let [a, b] = [2, 1].map(|k| self.known.std_of(encoder.part, 2 * order as usize - k).unwrap_or(0.0));
@@ -200,9 +210,10 @@ impl SplitWaves<'_> {
                         if is_encoders { "" } else { ": record several loads at the same angles, both ways" }
                     )
                 });
+                // What may be another's is open in both: of a wave that stays whole with the gear all of it.
+                open[which] += 0.5 * if is_encoders { of_gear } else { amplitude }.powi(2);
                 if is_encoders {
                     owner[begin..begin + 2].fill(which);
-                    open[which] += 0.5 * of_gear.powi(2);
                     gear.coefficients[begin..begin + 2].fill(0.0);
                 }
                 parts[if is_encoders { which } else { 2 }].shares.push(WaveShare {

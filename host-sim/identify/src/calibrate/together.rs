@@ -131,7 +131,7 @@ const OTHER_ZERO_RAD: f64 = 1500.0 / ARCSEC_PER_RAD;
 const FITS_TO_THE_OUTPUT: usize = 2;
 
 /// Name of the reading of a zero.
-const ZERO: &str = "zero";
+pub(super) const ZERO: &str = "zero";
 
 /// Where the generator of a log starts, against the first log.
 struct Start {

@@ -46,6 +46,9 @@ pub struct WindUpTorque {
     /// Half width of the error that the intervals are of, arcsec: where 95 of 100 rows of the other folds lie, and of
     /// all rows.
     pub half_width_arcsec: f64,
+    /// The same for who reads with the table alone, as the core does.
+    #[serde(default)]
+    pub half_width_alone_arcsec: f64,
     /// Hysteresis that the torques are read with, if they are better with one: no table holds it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hysteresis: Option<Hysteresis>,
@@ -152,18 +155,21 @@ impl WindUpTorque {
         let (.., mut hysteresis) = hysteresis_in(&of_all, widths_n_m, springs)?;
         let holds_arcsec = |of: &SlipSpring| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD;
         hysteresis.springs.retain(|spring| holds_arcsec(spring) > ROUNDING_ARCSEC);
-        Some(Self { hysteresis: Some(hysteresis), ..best })
+        Some(Self { hysteresis: Some(hysteresis), half_width_alone_arcsec: alone.half_width_arcsec, ..best })
     }
 
     /// With intervals wide enough for all rows as they are read by a table: those inside the play, and after a reversal
     /// of the load, among them.
     pub(super) fn over_all(self, files: &[Recording], table: &Table<'_>, temperature_c: f64) -> Self {
         let rows: Vec<_> = measured_rows(files.iter().flat_map(|file| &file.sessions), temperature_c).collect();
-        let hysteresis = self.hysteresis.clone().unwrap_or_default();
-        let half_rad = self.half_width_arcsec / ARCSEC_PER_RAD;
-        let mut needs = along(table, &rows, &hysteresis, |curve, row, error| curve.needs(row, error, half_rad));
-        let of_all_arcsec = quantile_of(&mut needs, INSIDE) * ARCSEC_PER_RAD;
-        Self { half_width_arcsec: self.half_width_arcsec.max(of_all_arcsec), ..self }
+        let of_all = |hysteresis: &Hysteresis, half_arcsec: f64| {
+            let half_rad = half_arcsec / ARCSEC_PER_RAD;
+            let mut needs = along(table, &rows, hysteresis, |curve, row, error| curve.needs(row, error, half_rad));
+            half_arcsec.max(quantile_of(&mut needs, INSIDE) * ARCSEC_PER_RAD)
+        };
+        let half_width_alone_arcsec = of_all(&Hysteresis::default(), self.half_width_alone_arcsec);
+        let with = self.hysteresis.as_ref().map(|hysteresis| of_all(hysteresis, self.half_width_arcsec));
+        Self { half_width_arcsec: with.unwrap_or(half_width_alone_arcsec), half_width_alone_arcsec, ..self }
     }
 
     /// Of fits, each without the fold of its place. Springs go by torques found, by those recorded between flanks.
@@ -200,6 +206,7 @@ impl WindUpTorque {
             inside: inside as f64 / off.len().max(1) as f64,
             rows: off.len(),
             half_width_arcsec: mean(&half_widths),
+            half_width_alone_arcsec: mean(&half_widths),
             hysteresis: None,
         }
     }

@@ -15,6 +15,7 @@ use super::parts::State;
 use super::rows::Rows;
 use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::median_of;
+use crate::misfit::AS_LIKELY;
 use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -24,6 +25,8 @@ const FOUND_WITH: usize = 6000;
 /// Steps over a generator turn, and over a tooth pitch.
 const STEPS_OF_A_TURN: usize = 48;
 const STEPS_OF_A_PITCH: usize = 24;
+/// Steps down from a place to the least, at most. *Guess*: wide play and wind-up move an output by some.
+const MOST_STEPS: usize = 24;
 /// Best places of the coarse search that are looked at closely.
 const CLOSELY: usize = 4;
 /// A table repeats if its error does to this, arcsec.
@@ -52,9 +55,16 @@ pub struct Alignment {
     pub left_after_arcsec: f64,
     /// Whether these logs tell it; then it is used.
     pub told: bool,
+    /// Whether the output, which reads absolutely, says the turn.
+    #[serde(skip)]
+    pub by_output: bool,
     /// Why, or why not.
     pub why: String,
 }
+
+/// An output reads absolutely if it says the zero of the generator to this much of it, rad. *Guess*: play and wind-up
+/// move it by less, and a zero set at will comes so close once in some dozen.
+const ABSOLUTE_RAD: f64 = 180.0 / ARCSEC_PER_RAD;
 
 /// Error of the table in steady motion, arcsec.
 pub(super) fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
@@ -166,9 +176,18 @@ impl<'a> PhaseSearch<'a> {
     }
 
     /// The least of the parabola through what a phase and its neighbours a `step` away leave, rad, and its standard
-    /// deviation by blocks of the rows left out in turn.
-    pub(super) fn close_to(&self, zero_rad: f64, step: f64) -> [f64; 2] {
-        let three = [-1.0, 0.0, 1.0].map(|k| self.left(zero_rad + k * step));
+    /// deviation by blocks of the rows left out in turn; from `zero_rad` down to where no neighbour leaves less.
+    pub(super) fn close_to(&self, mut zero_rad: f64, step: f64) -> [f64; 2] {
+        let at = |zero_rad: f64| [-1.0, 0.0, 1.0].map(|k| self.left(zero_rad + k * step));
+        let mut three = at(zero_rad);
+        for _ in 0..MOST_STEPS {
+            let [before, here, after] = three.each_ref().map(|left| dot(left, left));
+            if here <= before.min(after) {
+                break;
+            }
+            zero_rad += if before < after { -step } else { step };
+            three = at(zero_rad);
+        }
         let without = |begin: usize, end: usize| {
             vertex(three.each_ref().map(|left| dot(left, left) - dot(&left[begin..end], &left[begin..end])))
         };
@@ -211,6 +230,12 @@ pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignm
     let step = if least < usual * (1.0 - LEAST_GAIN) { fine_step } else { coarse_step };
     let [zero, std] = all.close_to(best, step);
     let rms = |zero: f64| (all.squares(zero) / found_with.len() as f64).sqrt();
+    // Turns that leave about as little are one to the rows: an output that reads absolutely says which.
+    let ratio = table.drive().exact_ratio();
+    let said = -ratio * rows.means_arcsec.first().copied().unwrap_or(0.0) / ARCSEC_PER_RAD;
+    let by_output = zero + TAU * ((said - zero) / TAU).round();
+    let reads = (said - by_output).abs() < ABSOLUTE_RAD * ratio.abs() && rms(by_output) < AS_LIKELY * rms(zero);
+    let zero = if reads { by_output } else { zero };
     let gain = 1.0 - least / usual.max(f64::MIN_POSITIVE);
     let flat = gain < LEAST_GAIN;
     let doubtful = !flat && second < least * (1.0 + LEAST_BEFORE_SECOND);
@@ -230,6 +255,7 @@ pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignm
         left_before_arcsec: rms(0.0),
         left_after_arcsec: rms(zero),
         told: !flat && !doubtful,
+        by_output: reads,
         why,
     }
 }

@@ -225,12 +225,13 @@ impl<'a> Subject<'a> {
     }
 
     /// The table of a model that holds causes, for a calibration of these recordings to begin with; none of another.
-    /// Errors of the output's encoder, which has no place in a table, are taken from the recordings, and noted.
+    /// Errors of the output's encoder, which has no place in a table, are taken from the recordings, and noted, unless
+    /// whose error it is will be `split`.
     ///
     /// # Errors
     /// It makes no table, or does not fit the recordings.
-    pub fn known_before(&self, files: &mut [Recording]) -> Result<Option<MadeTable>, PipelineError> {
-        for file in &mut *files {
+    pub fn known_before(&self, files: &mut [Recording], split: bool) -> Result<Option<MadeTable>, PipelineError> {
+        for file in files.iter_mut().filter(|_| !split) {
             let Some((names, added)) = self.known_arcsec(file, CauseEntry::of_output_encoder)? else { continue };
             less(&mut file.sessions, added.iter());
             file.notes.push(format!(
@@ -642,7 +643,7 @@ mod tests {
             text += &format!("{t:.2},{psi:.4},{:.6}\n", nominal.harmonics_arcsec(psi) + tilt);
         }
         let mut files = [parse("m.csv", text.as_bytes(), &ColumnMap::default(), &nominal.gear()).unwrap()];
-        assert!(subject.known_before(&mut files).unwrap().is_some());
+        assert!(subject.known_before(&mut files, false).unwrap().is_some());
         let session = &files[0].sessions[0];
         let left = session.generator_rad.iter().zip(&session.error_rad);
         let off = left.map(|(psi, error)| (error * ARCSEC_PER_RAD - nominal.harmonics_arcsec(*psi)).abs());
