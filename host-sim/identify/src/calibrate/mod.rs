@@ -139,12 +139,12 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
-    /// Whether the error falls somewhere while the load grows.
+    /// Whether the error falls somewhere while the load grows, or the output leads somewhere.
     fn is_of_a_fall(&self) -> bool {
-        use ProjectError::Write;
-        use TableError::Project;
+        use ProjectError::{NegativeHalfWidth, Write};
         use WriteError::Refused;
-        matches!(self, CalibrationError::Table(Project(Write(Refused(ImageError::Falls { .. })))))
+        let CalibrationError::Table(TableError::Project(error)) = self else { return false };
+        matches!(error, NegativeHalfWidth { .. } | Write(Refused(ImageError::Falls { .. })))
     }
 
     /// The error, with the files that it is of.
@@ -685,12 +685,12 @@ fn fit_with_table(
     };
     let fitted = fitted_without(&[])?;
     Ok(match table::make(prior, &fitted.model, recorded) {
-        // A table has no wind-up that falls with the load, and none that the lag outruns.
+        // A table has no wind-up that falls with the load, none that the lag outruns, and no lag that leads.
         Err(error) if error.is_of_a_fall() => {
             if fitted.model.of(PartName::WindUp).is_some() {
                 fitted.model.gives_way_with_the_load(prior)?;
             }
-            const FALLS: &str = "it would fall with the load somewhere, which no spring does";
+            const FALLS: &str = "with it the table would fall with the load, or the output lead, somewhere";
             let (wind_up, play) = ((PartName::WindUp, FALLS), (PartName::Play, FALLS));
             let tried = [vec![wind_up], vec![play], vec![wind_up, play]].into_iter().filter_map(|without| {
                 let fitted = fitted_without(&without).ok()?;

@@ -384,11 +384,15 @@ class Table:
         ``half_width_arcsec`` is that of the readings and of the table. A ``calibration`` gives it, and the hysteresis, which no table holds:
         torques as the command ``replay`` finds them.
         """
+        if calibration is not None and getattr(getattr(calibration, "table", None), "table_id", None) != self.table_id:
+            raise BadInput(f"calibration: found {calibration!r}, allowed: what calibrate gave with this table, {self.table_id}")
         found = {} if calibration is None else calibration.json.get("torque_from_wind_up", {})
         half_width_arcsec = found.get("half_width_arcsec", half_width_arcsec)
         hysteresis = json.dumps(found["hysteresis"]) if "hysteresis" in found and direction is None else None
         reading = numbers("output_rad", output_rad)
         generator, half_width = spread(numbers("generator_rad", generator_rad), reading.size), numbers("half_width_arcsec", half_width_arcsec)
+        if not (half_width >= 0.0).all():
+            raise BadInput(f"half_width_arcsec: found {half_width.min()}, allowed: 0 and more")
         temperature = numbers("temperature_c", temperature_c)
         said = WindUp({name: np.empty(generator.size) for name in ("torque_n_m", "low_n_m", "high_n_m")})
         play = None if state is None else state._inner
