@@ -22,7 +22,7 @@ use super::interval::{ModelUncertainty, OF_95};
 use super::parts::{GENERATOR_ORDERS, PartName, State, flank, usual_arcsec};
 use super::reading::OFFSET;
 use super::rows::Rows;
-use super::{BOTH_WAYS, Calibration, Model, Prior};
+use super::{BOTH_WAYS, Calibration, LEAST_GAIN, Model, Prior};
 use crate::misfit::about_mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -187,6 +187,10 @@ impl SplitWaves<'_> {
         let mut open = [0.0; 2];
         let mut owner = vec![2; model.coefficients.len()];
         for (which, encoder) in ENCODERS.iter().enumerate() {
+            if model.of(encoder.part).is_none() {
+                // What gains too little to be fitted may be there.
+                open[which] = LEAST_GAIN * self.known.noise.rms_arcsec.powi(2);
+            }
             if let Some((part, why)) = self.lacking.iter().find(|(part, _)| *part == encoder.part) {
                 open[which] = (OF_95 * usual_arcsec(*part, &model.scales)).powi(2);
                 parts[which].not_told = Some(why.clone());
