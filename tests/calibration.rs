@@ -129,27 +129,28 @@ fn the_command_writes_a_table_that_replay_reads() {
 }
 
 /// A log of a drive whose error does not repeat in each turn: 300 arcsec once a turn of the output (`eccentric`), 20
-/// twice a turn of the motor. The motor's angle reads `turns` more than it is.
-fn log_of(ratio: f64, eccentric: f64, turns: f64) -> String {
+/// twice a turn of the motor. The motor's angle reads `turns` more than it is, and the output `zero_arcsec`.
+fn log_of(ratio: f64, eccentric: f64, turns: f64, zero_arcsec: f64) -> String {
     let mut random = fastrand::Rng::with_seed(11);
     let mut text = "time_s,generator_rad,output_rad\n".to_owned();
     let mut psi = 0.3;
     for k in 0..6000 {
         psi += 1.3 * TAU * ratio / 3000.0 * if k < 3000 { 1.0 } else { -1.0 };
         let arcsec = eccentric * (psi / ratio).sin() + 20.0 * (2.0 * psi + 0.4).sin() + 2.0 * (random.f64() - 0.5);
-        let output = psi / ratio + arcsec * TAU / 1_296_000.0;
+        let output = psi / ratio + (arcsec + zero_arcsec) * TAU / 1_296_000.0;
         text += &format!("{:.3},{:.8},{output:.10}\n", 0.01 * f64::from(k), psi + TAU * turns);
     }
     text
 }
 
-/// A motor that was homed in another turn: the table adds the error of another place of the output. How many turns, and
-/// no word of a gain.
+/// A motor that was homed in another turn: the table adds the error of another place of the output. An output that
+/// reads absolutely says in which, and the rows are put there; of one that was set to zero anew how many turns, and no
+/// word of a gain.
 #[test]
 fn a_motor_zero_that_is_off_by_whole_turns_is_reported() {
     for (ratio, turns) in [(101.0, 40.0), (50.0, -17.0)] {
         let desk = Desk::new();
-        desk.write("log.csv", &log_of(ratio, 300.0, 0.0));
+        desk.write("log.csv", &log_of(ratio, 300.0, 0.0, 0.0));
         desk.line(&format!("calibrate log.csv --ratio {ratio} --no-report --out out")).done();
         let replayed = |name: &str, options: &str| -> Value {
             let run =
@@ -159,7 +160,11 @@ fn a_motor_zero_that_is_off_by_whole_turns_is_reported() {
         let rms = |json: &Value| json["rms_residual_arcsec"].as_f64().unwrap();
         let right = replayed("log.csv", "");
         assert!(right["generator_zero_off"].is_null() && rms(&right) < 10.0, "{right}");
-        desk.write("off.csv", &log_of(ratio, 300.0, turns));
+        desk.write("absolute.csv", &log_of(ratio, 300.0, turns, 0.0));
+        let put = replayed("absolute.csv", "");
+        let reads = format!("the generator reads {:+.2}", 360.0 * turns);
+        assert!(put["notes"].to_string().contains(&reads[..reads.len() - 3]) && rms(&put) < 10.0, "{reads}: {put}");
+        desk.write("off.csv", &log_of(ratio, 300.0, turns, 1800.0));
         let off = replayed("off.csv", "");
         assert_eq!(off["generator_zero_off"]["turns"].as_f64(), Some(turns), "{off}");
         assert!(off["generator_zero_off"]["rms_residual_arcsec"].as_f64().unwrap() < 10.0, "{off}");
@@ -173,17 +178,17 @@ fn a_motor_zero_that_is_off_by_whole_turns_is_reported() {
         let mended = replayed("off.csv", &format!("--columns generator=generator_rad:rad{rad},output=output_rad:rad"));
         assert!(mended["generator_zero_off"].is_null() && (rms(&mended) - rms(&right)).abs() < 1.0, "{mended}");
         // A drive that repeats in each turn does not ask in which it is homed.
-        desk.write("even.csv", &log_of(ratio, 0.0, 0.0));
-        desk.write("even_off.csv", &log_of(ratio, 0.0, turns));
+        desk.write("even.csv", &log_of(ratio, 0.0, 0.0, 0.0));
+        desk.write("even_off.csv", &log_of(ratio, 0.0, turns, 1800.0));
         desk.line(&format!("calibrate even.csv --ratio {ratio} --no-report --out out")).done();
         let even = replayed("even_off.csv", "");
         assert!(even["generator_zero_off"].is_null() && rms(&even) < 10.0, "{even}");
     }
     // Another unit's table: no turn makes it fit, and no gain is claimed.
     let desk = Desk::new();
-    desk.write("log.csv", &log_of(101.0, 300.0, 0.0));
+    desk.write("log.csv", &log_of(101.0, 300.0, 0.0, 0.0));
     desk.line("calibrate log.csv --ratio 101 --no-report --out out").done();
-    desk.write("other.csv", &log_of(101.0, 0.0, 0.0));
+    desk.write("other.csv", &log_of(101.0, 0.0, 0.0, 0.0));
     let said = desk.line("replay --tables out/calibrated.fxt other.csv --out again").done().stdout;
     assert!(said.contains("the table is worse than none here"), "{said}");
 }
@@ -273,6 +278,9 @@ fn logs_of_other_starts_make_one_table() {
             let inside = rows.iter().filter(|[is, _, low, high]| (low..=high).contains(&is)).count() as f64 / count;
             println!("{log}: {rms:.3} N·m rms, {inside:.3} inside");
             assert!(rms < 0.02 * 40.0 && (0.93..=0.97).contains(&inside), "{log}: {rms} {inside}");
+            // Beyond the loads of the table there is an end on the side alone that the table has.
+            let most = rows.iter().fold(0.0, |most: f64, [_, said, ..]| most.max(*said));
+            assert!(rows.iter().all(|[_, said, _, high]| *said < most || *high == f64::INFINITY), "{log}");
         }
         std::fs::create_dir_all(desk.path("known")).unwrap();
         std::fs::copy(desk.path("out/calibrated.fxt"), desk.path("known/cam.fxt")).unwrap();
