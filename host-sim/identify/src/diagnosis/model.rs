@@ -4,9 +4,8 @@
 //! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first.
 //! Nuisance columns get a prior in proportion to what the main columns of their law explain, found by iteration.
 
-use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use super::Fineness;
 use super::candidate::{Acting, Among, Coefficients, Excitation, Law, Regressor, Tag, Tolerance, left_by};
@@ -35,22 +34,10 @@ pub(crate) struct Problem<'a> {
     base_white: Set,
     /// Rows to an average, noise and information weight.
     pub fineness: Fineness,
-    /// What was evaluated where laws are tried first.
-    tried: Mutex<Tried>,
     /// Products of white columns; their blocks are left out one at a time: sessions, or quarters of the data where
     /// there are fewer than three.
     products: Products,
 }
-
-/// White columns by law, extent and places (their bits), as long as there is room.
-#[derive(Default)]
-struct Tried {
-    columns: HashMap<(u64, Extent, Vec<u64>), Arc<White>>,
-    values: usize,
-}
-
-/// Values that are kept of what was tried: 768 MiB. *Guess*: it bounds the memory, and changes no result.
-const MOST_KEPT: usize = 96 << 20;
 
 /// How much of a law is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -73,9 +60,9 @@ impl<'a> Problem<'a> {
         let base: Vec<Vec<f64>> = on.base.floating.iter().map(|f| whitener.average(&f.values)).collect();
         let base_white = Set::new(whitener.whiten_each(&base));
         let certain = whitener.certain(uncertain);
-        let (uncertain, tried) = (uncertain.to_vec(), Mutex::default());
+        let uncertain = uncertain.to_vec();
         let products = Products::over(whitener.blocks());
-        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, fineness, tried, products }
+        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, fineness, products }
     }
 
     /// Blocks of averages that are left out one at a time.
@@ -94,24 +81,6 @@ impl<'a> Problem<'a> {
     #[must_use]
     pub(crate) fn white_columns<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s [f64]> {
         self.sets(terms, further).into_iter().flat_map(|set| set.iter()).map(Vec::as_slice).collect()
-    }
-
-    /// White columns of a law by itself at places where it is tried again and again.
-    fn tried(&self, law: &Law, extent: Extent, places: &[f64]) -> Arc<White> {
-        let key = (law.id(), extent, places.iter().map(|place| place.to_bits()).collect());
-        let kept = || self.tried.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = kept().columns.get(&key) {
-            return known.clone();
-        }
-        let (_, white) = White::of(self, columns(law, extent, &self.on, places));
-        let white = Arc::new(white);
-        let values = white.len() * self.data.len();
-        let mut kept = kept();
-        // Another thread may have evaluated the same meanwhile: it counts once.
-        if kept.values + values <= MOST_KEPT && kept.columns.insert(key, white.clone()).is_none() {
-            kept.values += values;
-        }
-        white
     }
 
     fn base_priors(&self) -> Vec<Prior> {
@@ -475,14 +444,10 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// White columns of a law among the terms.
-    fn white(&self, law: &Law, extent: Extent, places: &[f64]) -> Arc<White> {
-        match self.left_to(law) {
-            None => self.problem.tried(law, extent, places),
-            among => {
-                let on = left_by(among.as_deref(), &self.problem.on);
-                Arc::new(White::of(self.problem, columns(law, extent, &on, places)).1)
-            }
-        }
+    fn white(&self, law: &Law, extent: Extent, places: &[f64]) -> White {
+        let among = self.left_to(law);
+        let on = left_by(among.as_deref(), &self.problem.on);
+        White::of(self.problem, columns(law, extent, &on, places)).1
     }
 
     /// The solution with a law tried at some places: with all its columns where it is `whole`, else with the main ones.
