@@ -14,7 +14,6 @@
 //!
 //! Every decision on the way is in the `trace`; `explain` says from it why a cause was named or not.
 
-mod averaged;
 pub mod base;
 pub(crate) mod candidate;
 pub(crate) mod channels;

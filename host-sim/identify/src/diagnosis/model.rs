@@ -4,12 +4,10 @@
 //! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first.
 //! Nuisance columns get a prior in proportion to what the main columns of their law explain, found by iteration.
 
-use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use super::Fineness;
-use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Coefficients, Excitation, Law, Regressor, Tag, Tolerance, left_by};
 use super::noise::Whitener;
 use super::products::{Products, Set};
@@ -36,24 +34,10 @@ pub(crate) struct Problem<'a> {
     base_white: Set,
     /// Rows to an average, noise and information weight.
     pub fineness: Fineness,
-    /// What laws are evaluated on.
-    grain: Grain,
-    /// What was evaluated where laws are tried first.
-    tried: Mutex<Tried>,
     /// Products of white columns; their blocks are left out one at a time: sessions, or quarters of the data where
     /// there are fewer than three.
     products: Products,
 }
-
-/// White columns by law, extent and places (their bits), as long as there is room.
-#[derive(Default)]
-struct Tried {
-    columns: HashMap<(u64, Extent, Vec<u64>), Arc<White>>,
-    values: usize,
-}
-
-/// Values that are kept of what was tried: 768 MiB. *Guess*: it bounds the memory, and changes no result.
-const MOST_KEPT: usize = 96 << 20;
 
 /// How much of a law is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -71,28 +55,14 @@ impl<'a> Problem<'a> {
     #[must_use]
     pub fn new(on: Excitation<'a>, uncertain: &[bool], fineness: Fineness) -> Problem<'a> {
         let whitener = Whitener::new(on.rows, uncertain, fineness.stride, fineness.noise);
-        let grain = Grain::new(Averaged::of(&on, fineness.stride), &whitener);
         let data = whitener.average(&on.left(&[]));
         let data_white = Set::new(vec![whitener.whiten_averaged(&data)]);
         let base: Vec<Vec<f64>> = on.base.floating.iter().map(|f| whitener.average(&f.values)).collect();
         let base_white = Set::new(whitener.whiten_each(&base));
         let certain = whitener.certain(uncertain);
-        let (uncertain, tried) = (uncertain.to_vec(), Mutex::default());
+        let uncertain = uncertain.to_vec();
         let products = Products::over(whitener.blocks());
-        Problem {
-            on,
-            uncertain,
-            whitener,
-            certain,
-            data,
-            data_white,
-            base,
-            base_white,
-            fineness,
-            grain,
-            tried,
-            products,
-        }
+        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, fineness, products }
     }
 
     /// Blocks of averages that are left out one at a time.
@@ -111,29 +81,6 @@ impl<'a> Problem<'a> {
     #[must_use]
     pub(crate) fn white_columns<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s [f64]> {
         self.sets(terms, further).into_iter().flat_map(|set| set.iter()).map(Vec::as_slice).collect()
-    }
-
-    /// White columns of a law by itself at places where it is tried again and again.
-    fn tried(&self, law: &Law, extent: Extent, places: &[f64]) -> Arc<White> {
-        let key = (law.id(), extent, places.iter().map(|place| place.to_bits()).collect());
-        let kept = || self.tried.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = kept().columns.get(&key) {
-            return known.clone();
-        }
-        let (_, white) = White::of(self, law, columns(law, extent, &self.excitation(law), places));
-        let white = Arc::new(white);
-        let values = white.len() * self.data.len();
-        let mut kept = kept();
-        // Another thread may have evaluated the same meanwhile: it counts once.
-        if kept.values + values <= MOST_KEPT && kept.columns.insert(key, white.clone()).is_none() {
-            kept.values += values;
-        }
-        white
-    }
-
-    /// What a law is evaluated on, with nothing that other causes change.
-    fn excitation(&self, law: &Law) -> Excitation<'_> {
-        self.grain.excitation(law.smooth(), &self.on)
     }
 
     fn base_priors(&self) -> Vec<Prior> {
@@ -178,9 +125,8 @@ pub(crate) struct White {
 
 impl White {
     /// Averages columns and makes them white; returns the averages as well.
-    fn of(problem: &Problem<'_>, law: &Law, columns: Vec<Regressor>) -> (Vec<Vec<f64>>, White) {
-        let average = |c: &Regressor| problem.grain.average(law.smooth(), &problem.whitener, &c.values);
-        let averaged: Vec<Vec<f64>> = columns.iter().map(average).collect();
+    fn of(problem: &Problem<'_>, columns: Vec<Regressor>) -> (Vec<Vec<f64>>, White) {
+        let averaged: Vec<Vec<f64>> = columns.iter().map(|c| problem.whitener.average(&c.values)).collect();
         let columns_white = Set::new(problem.whitener.whiten_each(&averaged));
         let size = averaged.iter().map(|c| rms(c)).collect();
         let tolerances = columns.iter().map(|c| c.tolerance).collect();
@@ -262,9 +208,8 @@ impl<'l> Term<'l> {
         among: Option<Arc<Among>>,
         extent: Extent,
     ) -> Term<'l> {
-        let recorded = problem.excitation(law);
-        let on = left_by(among.as_deref(), &recorded);
-        let (averaged, white) = White::of(problem, law, columns(law, extent, &on, &places));
+        let on = left_by(among.as_deref(), &problem.on);
+        let (averaged, white) = White::of(problem, columns(law, extent, &on, &places));
         Term { law, places, averaged: Arc::new(averaged), white, occam: -law.search.odds_against, among }
     }
 
@@ -399,8 +344,8 @@ pub(crate) struct Scaffold<'p, 'a, 't, 'l> {
     terms: Vec<&'t Term<'l>>,
     /// Terms that come before what is tried, where the order matters.
     ahead: usize,
-    /// What the terms leave to a law that adds a load, or meets them in the zones of teeth, or is smooth, or not.
-    left: [OnceLock<Option<Arc<Among>>>; 8],
+    /// What the terms leave to a law that adds a load, or meets them in the zones of teeth, or not.
+    left: [OnceLock<Option<Arc<Among>>>; 4],
 }
 
 /// Terms of laws (index) at places of their shape parameters, each on what the others leave to it.
@@ -499,15 +444,10 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// White columns of a law among the terms.
-    fn white(&self, law: &Law, extent: Extent, places: &[f64]) -> Arc<White> {
-        match self.left_to(law) {
-            None => self.problem.tried(law, extent, places),
-            among => {
-                let recorded = self.problem.excitation(law);
-                let on = left_by(among.as_deref(), &recorded);
-                Arc::new(White::of(self.problem, law, columns(law, extent, &on, places)).1)
-            }
-        }
+    fn white(&self, law: &Law, extent: Extent, places: &[f64]) -> White {
+        let among = self.left_to(law);
+        let on = left_by(among.as_deref(), &self.problem.on);
+        White::of(self.problem, columns(law, extent, &on, places)).1
     }
 
     /// The solution with a law tried at some places: with all its columns where it is `whole`, else with the main ones.
@@ -525,7 +465,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// What the terms leave to a law.
     fn left_to(&self, law: &Law) -> Option<Arc<Among>> {
-        let kind = usize::from(law.is_load()) + 2 * usize::from(law.acts.meets_zones) + 4 * usize::from(law.smooth());
+        let kind = usize::from(law.is_load()) + 2 * usize::from(law.acts.meets_zones);
         let acts = |k: usize| self.terms[k].law.acts_on(law) && (k < self.ahead || !self.terms[k].law.meets(law));
         if !(0..self.terms.len()).any(acts) {
             return None;
@@ -534,7 +474,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             let fit = self.fit(None)?;
             let acting: Vec<Acting<'l>> =
                 (0..self.terms.len()).filter(|k| acts(*k)).map(|k| self.terms[k].acting(fit.of(k))).collect();
-            Among::of(&self.problem.excitation(law), &acting).map(Arc::new)
+            Among::of(&self.problem.on, &acting).map(Arc::new)
         });
         left.clone()
     }
@@ -650,8 +590,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     fn derivatives(&self, term: &Term<'_>, coefficients: &[f64]) -> Vec<Vec<f64>> {
         let problem = self.problem;
         let here = term.contribution(coefficients);
-        let recorded = problem.excitation(term.law);
-        let on = left_by(term.among.as_deref(), &recorded);
+        let on = left_by(term.among.as_deref(), &problem.on);
         (0..term.places.len())
             .map(|i| {
                 let mut places = term.places.clone();
@@ -661,7 +600,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 // Sums, averages and the whitening are linear: one column for all.
                 let moved = columns(term.law, Extent::Whole, &on, &places);
                 let there = combined(on.rows.len(), moved.iter().map(|column| column.values.as_slice()), coefficients);
-                let mut change = problem.grain.average(term.law.smooth(), &problem.whitener, &there);
+                let mut change = problem.whitener.average(&there);
                 change.iter_mut().zip(&here).for_each(|(there, here)| *there = (*there - here) / step);
                 problem.whitener.whiten_averaged(&change)
             })

@@ -6,7 +6,6 @@ use flexspline::Table;
 use rayon::prelude::*;
 
 use super::LEAST_ROWS;
-use super::averaged::{Averaged, Grain};
 use super::base::{Base, Floating, NEAR_FRICTION, few};
 use super::candidate::{Excitation, Law, Regressor, Tolerance};
 use super::model::{Problem, Term};
@@ -299,25 +298,20 @@ pub(crate) struct FreeColumns {
 }
 
 impl FreeColumns {
-    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on averages of
-    /// `finest` rows, if these hold for them.
+    /// Main columns of laws, at some places of their shape parameters, averaged over whole averages of `finest` rows.
     #[must_use]
     pub fn of(on: &Excitation<'_>, laws: &[Law], finest: usize) -> FreeColumns {
-        let averaged = Averaged::of(on, finest);
-        let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride);
         let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
         let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
-        let grain = Grain::new(averaged, &plain);
         let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
         let of_law = |law: &Law| -> Vec<Vec<f64>> {
             let tried = law.tried();
             let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
-            let on = grain.excitation(law.smooth(), on);
-            let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
+            let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(on, &law.values(places)));
             let counts =
                 |column: &Regressor| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
             let wide = |column: Regressor| {
-                let mut averaged = grain.average(law.smooth(), &plain, &column.values);
+                let mut averaged = plain.average(&column.values);
                 let std = 20.0 / rms(&averaged).max(1e-9);
                 averaged.iter_mut().for_each(|value| *value *= std);
                 averaged

@@ -142,12 +142,12 @@ impl RingShape {
     }
 
     /// The deflection `w0` on the major axis, mm.
-    pub(crate) fn w0_mm(&self) -> f64 {
+    pub fn w0_mm(&self) -> f64 {
         self.amplitude
     }
 
     /// Angle in `0..pi/2` where the closed form changes; 0 where it does not.
-    pub(crate) fn break_angle(&self) -> f64 {
+    pub fn break_angle(&self) -> f64 {
         match self.form {
             Form::Cam => 0.0,
             Form::Rollers { b, .. } => b,
@@ -231,7 +231,7 @@ impl RingShape {
     }
 
     /// `w + w''`, mm; the curvature of the ring grows by `-(w + w'') / R^2`.
-    pub(crate) fn bending(&self, phi: f64) -> f64 {
+    pub fn bending(&self, phi: f64) -> f64 {
         let [w, _, ddw] = self.radial(phi);
         w + ddw
     }
@@ -284,6 +284,109 @@ mod tests {
                 // the rollers' w'' has a kink
                 assert!((slope - ddw).abs() < 1e-3, "{shape:?} w'' at {phi}: {ddw}, difference {slope}");
             }
+        }
+    }
+
+    fn shape(kind: GeneratorKind, angle_deg: f64) -> RingShape {
+        match kind {
+            GeneratorKind::Cam => RingShape::cam(1.0),
+            GeneratorKind::TwoRoller => RingShape::two_roller(1.0),
+            GeneratorKind::FourRoller => RingShape::four_roller(1.0, angle_deg.to_radians()),
+            GeneratorKind::DoubleDisc => RingShape::double_disc(1.0, angle_deg.to_radians()),
+        }
+    }
+
+    /// Simpson's rule.
+    fn integral(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
+        let n = 400;
+        let h = (to - from) / f64::from(n);
+        let weight = |k| match k {
+            k if k == 0 || k == n => 1.0,
+            k if k % 2 == 1 => 4.0,
+            _ => 2.0,
+        };
+        (0..=n).map(|k| weight(k) * f(from + h * f64::from(k))).sum::<f64>() * h / 3.0
+    }
+
+    /// Over a quarter, split where the closed form changes.
+    fn quarter(split: f64, f: impl Fn(f64) -> f64) -> f64 {
+        integral(0.0, split, &f) + integral(split, FRAC_PI_2, &f)
+    }
+
+    const CASES: [(GeneratorKind, f64); 8] = [
+        (GeneratorKind::Cam, 0.0),
+        (GeneratorKind::TwoRoller, 0.0),
+        (GeneratorKind::FourRoller, 25.0),
+        (GeneratorKind::FourRoller, 30.0),
+        (GeneratorKind::FourRoller, 35.0),
+        (GeneratorKind::DoubleDisc, 20.0),
+        (GeneratorKind::DoubleDisc, 30.0),
+        (GeneratorKind::DoubleDisc, 40.0),
+    ];
+
+    #[test]
+    fn the_ring_keeps_its_length_and_closes() {
+        for (kind, angle) in CASES {
+            let ring = shape(kind, angle);
+            assert!((ring.w(0.0) - 1.0).abs() < 1e-13, "{kind} {angle}: w(0)");
+            assert!(ring.v(0.0).abs() + ring.v(FRAC_PI_2).abs() < 1e-13, "{kind} {angle}: v at the axes");
+            let slope = ring.radial(0.0)[1].abs() + ring.radial(FRAC_PI_2)[1].abs();
+            assert!(slope < 1e-13, "{kind} {angle}: w' at the axes");
+            let mean = quarter(ring.break_angle(), |phi| ring.w(phi));
+            assert!(mean.abs() < 1e-10, "{kind} {angle}: mean of w {mean}");
+            // v' = -w, and nothing jumps at the break
+            let h = 1e-4;
+            for k in 0..300 {
+                let phi = 0.0052 * f64::from(k) + 3e-4;
+                let dv = (ring.v(phi + h) - ring.v(phi - h)) / (2.0 * h);
+                assert!((dv + ring.w(phi)).abs() < 1e-7, "{kind} {angle}: v' + w at {phi}");
+            }
+            let b = ring.break_angle();
+            for j in 0..3 {
+                let jump = ring.radial(b + 1e-9)[j] - ring.radial(b - 1e-9)[j];
+                assert!(jump.abs() < 1e-7, "{kind} {angle}: derivative {j} jumps by {jump}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_of_the_reference_table() {
+        // w(90°), largest w + w'' taken positive inward and where (degrees), outward at 90°, mean of its square,
+        // cosine coefficients 2, 4, 6; all over w0
+        let table: [(f64, f64, f64, f64, f64, [f64; 3]); 8] = [
+            (-1.0, 3.0, 0.0, 3.0, 4.5, [1.0, 0.0, 0.0]),
+            (-0.9183, 4.279, 0.0, 2.442, 4.280, [0.9509, 0.0380, 0.0070]),
+            (-1.028, 2.857, 25.0, 3.038, 4.83, [1.024, -0.011, -0.010]),
+            (-1.088, 3.047, 30.0, 3.433, 5.42, [1.058, -0.042, -0.016]),
+            (-1.197, 3.849, 35.0, 4.212, 7.07, [1.117, -0.100, -0.021]),
+            (-0.981, 2.816, 0.0, 2.762, 4.50, [0.995, 0.012, -0.004]),
+            (-1.044, 2.447, 0.0, 3.165, 4.91, [1.031, -0.021, -0.010]),
+            (-1.121, 2.192, 0.0, 3.805, 5.66, [1.068, -0.063, -0.008]),
+        ];
+        for ((kind, angle), (minor, most, at, outward, square, cosines)) in CASES.into_iter().zip(table) {
+            let ring = shape(kind, angle);
+            let near = |found: f64, expected: f64, tolerance: f64, what: &str| {
+                assert!((found - expected).abs() <= tolerance, "{kind} {angle}: {what} {found}, expected {expected}");
+            };
+            near(ring.w(FRAC_PI_2), minor, 6e-4, "w(90)");
+            let tightest = (0..=9000).map(|k| -ring.bending((0.01 * f64::from(k)).to_radians())).fold(0.0, f64::max);
+            near(tightest, most, 6e-4, "largest curvature change");
+            near(-ring.bending(at.to_radians()), most, 6e-4, "curvature change at its place");
+            near(ring.bending(FRAC_PI_2), outward, 6e-4, "curvature change at 90");
+            let split = ring.break_angle();
+            near(quarter(split, |phi| ring.bending(phi).powi(2)) / FRAC_PI_2, square, 6e-3, "mean square");
+            for (order, expected) in [2.0, 4.0, 6.0].into_iter().zip(cosines) {
+                let found = quarter(split, |phi| ring.w(phi) * (order * phi).cos()) * 4.0 / PI;
+                near(found, expected, 6e-4, "cosine coefficient");
+            }
+        }
+    }
+
+    #[test]
+    fn disc_eccentricities() {
+        for (angle, expected) in [(20.0, 3.8164), (30.0, 3.4467), (40.0, 3.1925)] {
+            let found = shape(GeneratorKind::DoubleDisc, angle).disc_eccentricity_ratio().unwrap();
+            assert!((found - expected).abs() < 6e-5, "{angle}: {found}");
         }
     }
 }

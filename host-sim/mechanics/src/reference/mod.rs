@@ -2,9 +2,6 @@
 //!
 //! Used by tests and by the validation; no part of the simulation itself.
 
-mod ring;
 mod tooth_path;
 
-pub use crate::drive::RingShape;
-pub use ring::{ContactLoads, RingBending};
 pub use tooth_path::{ToothPath, ToothPathPoint};

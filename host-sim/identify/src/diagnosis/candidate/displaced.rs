@@ -172,7 +172,6 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
         scale > 0.5 && second_order_unloaded(c, shape, by) > least
     })
     .parts_zones(move |on, shape, _| Displacement::of(of, on, shape).zones(on, &faded(on, half_of(shape))))
-    .evaluated_on_averages()
     .led_by(
         move |on, shape| {
             let half = half_of(shape);

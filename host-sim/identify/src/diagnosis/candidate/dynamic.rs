@@ -98,7 +98,6 @@ fn gravity_torque(play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>
             vec![(Name::TorqueNM, torque_n_m), (Name::PhaseRad, shape.of(Name::PhaseRad))]
         })
         .physical_if(move |shape, _| shape.of(Name::TorqueNM) > least * scale)
-        .evaluated_on_averages()
         .adds_load(move |on, shape| load(on, of(shape)))
         .led_by(
             move |on, _| {

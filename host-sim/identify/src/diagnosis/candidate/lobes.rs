@@ -92,7 +92,6 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         });
         columns
     })
-    .evaluated_on_averages()
     .shapes(if loaded {
         vec![
             Shape::by_factors(Name::DeeperArcsec, DEEPER_ARCSEC[0], DEEPER_ARCSEC[1], 3),

@@ -367,8 +367,6 @@ pub(crate) struct Law {
     parameters: MakeParameters,
     /// Whether shape parameters and coefficients make sense, signs above all.
     physical: IsPhysical,
-    /// It changes little from one row to the next.
-    smooth: bool,
     /// How it may be wrong.
     pub wrong: Wrong,
     /// How it is looked for.
@@ -453,7 +451,6 @@ impl Law {
             columns: Arc::new(columns),
             parameters: Arc::new(|_, _, _| Vec::new()),
             physical: Arc::new(|_, _| true),
-            smooth: false,
             wrong: Wrong {
                 misfit: USUAL_MISFIT,
                 misfit_unnamed: 0.0,
@@ -519,15 +516,6 @@ impl Law {
     fn kin_of_shapes(mut self) -> Law {
         self.wrong.kin = Kin::Shape;
         self
-    }
-    fn evaluated_on_averages(mut self) -> Law {
-        self.smooth = true;
-        self
-    }
-    /// Whether it changes little from one row to the next, so that it holds for averages of rows.
-    #[must_use]
-    pub(crate) fn smooth(&self) -> bool {
-        self.smooth
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
         self.shapes = shapes.into_iter().collect();

@@ -91,7 +91,6 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         columns.push(nuisance(by_row(on, |k| load_share(on, k).abs()), WIDER_ONE_WAY));
         columns
     })
-    .evaluated_on_averages()
     .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
     .parameters_by(move |_, shape, c| {
         vec![(Name::HalfWidthArcsec, half_width(load, shape, c)), (Name::SlipTorqueNM, shape.of(Name::SlipTorqueNM))]
@@ -123,7 +122,6 @@ fn stiffness_hardening() -> Law {
             nuisance(power(exponent + 1.5), 0.3),
         ]
     })
-    .evaluated_on_averages()
     .shapes([Shape::evenly(Name::Exponent, 1.6, 4.4, 3)])
     .parameters_by(|on, shape, c| {
         vec![
@@ -236,7 +234,6 @@ fn wear(timed: bool) -> Law {
     })
     .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
     .well_known()
-    .evaluated_on_averages()
 }
 
 /// Growth of the clearance between two sessions.
@@ -270,8 +267,7 @@ fn wear_between_sessions(on: &Excitation<'_>) -> Option<Law> {
         growth > 0.0 && c.all(STEP).all(|step| step > -NOT_NARROWER * growth)
     })
     .well_known()
-    .variant("between sessions")
-    .evaluated_on_averages();
+    .variant("between sessions");
     Some(law)
 }
 

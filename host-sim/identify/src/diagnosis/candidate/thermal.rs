@@ -31,7 +31,6 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
     .shapes(on.rows.recorded.time.then(|| Shape::by_factors(Name::LagS, 0.5, 600.0, 3)))
     .parameters_by(|_, shape, c| named_clearance(2.0 * c.of(Tag::SIZE), shape))
     .well_known()
-    .evaluated_on_averages()
 }
 
 /// Lag with which the clearance follows the sensor, s; next to nothing where no time was recorded.
@@ -68,7 +67,6 @@ fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
     .parameters_by(|_, shape, c| named_clearance(shape.of(Name::ClearanceArcsecPerK) * c.of(Tag::SIZE), shape))
     .physical_if(|_, c| c.of(Tag::SIZE) > 0.5)
     .well_known()
-    .evaluated_on_averages()
 }
 
 /// Largest change of the clearance with temperature, arcsec/K: twice that of a hot generator in a cold ring (2″/K).
@@ -85,7 +83,6 @@ fn thermal_stiffness() -> Law {
     })
     .parameters_by(|_, _, c| vec![(Name::StiffnessRelativePerK, -0.01 * c.of(Tag::SIZE))])
     .well_known()
-    .evaluated_on_averages()
 }
 
 /// How a drag depends on speed and temperature.
@@ -161,7 +158,6 @@ fn lubricant_viscosity(on: &Excitation<'_>) -> Law {
         ])
         .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Tag::SIZE)))
         .physical_if(|shape, c| c.of(Tag::SIZE) > 0.0 && Drag::of(shape).is_viscous())
-        .evaluated_on_averages()
         .adds_load(load)
         .led_by(
             |on, shape| {
