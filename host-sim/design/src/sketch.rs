@@ -1,6 +1,6 @@
 //! A dimensioned sketch of a drive: half of a section along its axis, undeformed and to scale.
 
-use flexspline_mechanics::drive::Drive;
+use flexspline_mechanics::drive::{Drive, SleeveKind};
 use flexspline_mechanics::mesh::MeshError;
 use flexspline_mechanics::sleeve::{End, Flexspline3d, PlateEdge};
 
@@ -47,13 +47,18 @@ pub fn sketch(drive: &Drive) -> Result<String, MeshError> {
     let y = |mm: f64| ROOM_PX + px_per_mm * (outer - mm);
     let rectangle = |[from, to, inner, outer]: &Piece| {
         let (width, height) = (px_per_mm * (to - from), px_per_mm * (outer - inner));
-        format!("<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>", x(*from), y(*outer))
+        format!(
+            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"currentColor\" \
+             fill-opacity=\".12\"/>",
+            x(*from),
+            y(*outer)
+        )
     };
     let mut drawn: Vec<String> = pieces.iter().map(rectangle).collect();
     let end = x(most) + ROOM_PX;
     drawn.push(format!("<path d=\"M{ROOM_PX} {:.1}H{end:.1}\" stroke-dasharray=\"12 3 2 3\"/>", y(0.0)));
     let mut words = Vec::new();
-    let diameters = [
+    let mut diameters = vec![
         ("circular spline, outside", ring.outer_radius_mm),
         ("circular spline, root circle", ring.root_radius_mm),
         ("flexspline, tip circle", wheel.tip_radius_mm),
@@ -61,10 +66,18 @@ pub fn sketch(drive: &Drive) -> Result<String, MeshError> {
         ("flexspline, root circle", wheel.root_radius_mm),
         ("flexspline, bore", wheel.bore_radius_mm()),
     ];
+    if drive.sleeve.kind == SleeveKind::Cup {
+        diameters.push(("hub", drive.sleeve.hub_radius_mm));
+    }
     let mut line = 0.0;
     for (what, radius) in diameters {
         line = y(radius).max(line + LINE_PX);
-        drawn.push(format!("<path d=\"M{:.1} {:.1}H{end:.1}L{:.1} {line:.1}\"/>", x(width), y(radius), end + ROOM_PX));
+        drawn.push(format!(
+            "<path d=\"M{:.1} {:.1}H{end:.1}L{:.1} {line:.1}\" stroke-opacity=\".4\"/>",
+            x(width),
+            y(radius),
+            end + ROOM_PX
+        ));
         words.push((end + ROOM_PX + 4.0, line + 4.0, format!("⌀ {:.3} {what}", 2.0 * radius)));
     }
     let below = y(0.0) + ROOM_PX;
@@ -102,7 +115,7 @@ mod tests {
 
     #[test]
     fn pieces_are_to_scale_and_sizes_are_in_words() {
-        let drive = Drive::cup_95();
+        let drive = Drive::cup_95().with_sets(["sleeve.bottom=plate"]).unwrap();
         let svg = sketch(&drive).unwrap();
         let [ring, rim, tube, plate] = rectangles(&svg)[..] else { panic!("{svg}") };
         let px_per_mm = rim[0] / drive.flexspline.width_mm;
