@@ -43,7 +43,8 @@ pub fn fillets(ccx: &Path, out: &Path, claims: &mut Claims) -> Result<String, St
         let drive = Drive::hhd_95();
         let (at, reference_c) = ((0.0, torque_n_m), drive.temperature.reference_c);
         let settings = SolverSettings::default();
-        let stress = stress_by_place(&drive, kind, reference_c, at, settings).map_err(|error| error.to_string())?;
+        let stress =
+            stress_by_place(&drive, kind, reference_c, at, settings, None).map_err(|error| error.to_string())?;
         let ours =
             stress.iter().find(|stress| stress.place == Place::RootFillet).ok_or("no stress of the root fillet")?;
         let finest = MESHES[MESHES.len() - 1];

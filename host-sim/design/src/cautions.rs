@@ -235,6 +235,11 @@ pub fn add_stress(cautions: &mut Vec<Caution>, stress: &[PlaceStress]) {
         let place = format!(", {}, over three meshes", worst.place.in_words());
         cautions.push(Caution { figure: OVER_MESHES, value, limit: YIELD_MPA, words: above_yield(value, &place) });
     }
+    let tired = stress.iter().filter_map(|of| of.fatigue).find(|fatigue| fatigue.safety < 1.0);
+    cautions.extend(tired.map(|fatigue| {
+        let words = format!("safety against fatigue {:.2} {}", fatigue.safety, fatigue.in_words().0);
+        Caution { figure: "fatigue", value: fatigue.safety, limit: 1.0, words }
+    }));
 }
 
 /// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where
@@ -345,6 +350,7 @@ mod tests {
             interval_mpa: [0.97 * von_mises_mpa, 1.03 * von_mises_mpa],
             by_mesh_mpa: [von_mises_mpa; 3],
             tooth: 0,
+            fatigue: None,
         };
         let mut cautions =
             LookedAt { root_fillet_mpa: Some([1010.0; 2]), slope_bound: Some(0.9), ..LookedAt::default() }.cautions();

@@ -10,7 +10,10 @@ use super::page::{
 };
 use flexspline_design::cautions::Caution;
 use flexspline_design::simulate::Row;
+use flexspline_design::sketch::sketch;
 use flexspline_design::stated::{Beside, SheetBeside};
+use flexspline_mechanics::drive::Drive;
+use flexspline_mechanics::mesh::MeshError;
 
 /// A value of a row, by what a legend calls it.
 pub(super) type OfRow = (&'static str, fn(&Row) -> f64);
@@ -94,6 +97,16 @@ pub fn sleeve_figure() -> Figure {
                displacement";
     let figure = Figure::of("sleeve", "The flexspline in three dimensions", caption, FigureBody::Sleeve);
     Figure { alt: alt.into(), ..figure }
+}
+
+/// The sizes of a drive, drawn.
+///
+/// # Errors
+/// The drive has no mesh.
+pub(super) fn sizes_section(drive: &Drive) -> Result<PageSection, MeshError> {
+    let caption = "Half of a section along the axis, undeformed and to scale.";
+    let figure = Figure::of("sizes", "Sizes of the drive", caption, FigureBody::Svg(sketch(drive)?));
+    Ok(PageSection::folded("sizes", "Sizes", vec![PageBlock::Figure(figure)]))
 }
 
 /// Stress and pressures over a pitch.

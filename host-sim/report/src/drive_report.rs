@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::animation::{Animation, AnimationError, FRAMES};
 use super::drive_figures::{
     apart, caution_words, drive_figure, less_mean, mean_arcsec, over_pitch, sharing_figure, sharing_lines,
-    sheet_section, sleeve_figure, stress_figure, stress_lines,
+    sheet_section, sizes_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
     ChartAxis, ChartSeries, Choice, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
@@ -325,6 +325,7 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
     sections.extend(stress_section(&known));
     sections.push(table_section(&known));
     sections.push(load_section(&known));
+    sections.extend(known.first().and_then(|k| sizes_section(k.drive).ok()));
     sections.push(reading_section());
     let mut results = Map::new();
     results.insert("tables".into(), known.iter().map(result_of).collect());
@@ -469,11 +470,12 @@ fn stress_section(known: &[DriveKnown<'_>]) -> Option<PageSection> {
         let rows = info.stress.iter().map(|stress| {
             let [low, high] = stress.interval_mpa;
             let numbers = [stress.von_mises_mpa, low, high].map(|value| RichText::new(significant(value, 3)));
-            [vec![RichText::new(stress.place.in_words())], numbers.into()].concat()
+            let safety = stress.fatigue.map_or_else(String::new, |of| significant(of.safety, 3));
+            [vec![RichText::new(stress.place.in_words())], numbers.into(), vec![RichText::new(safety)]].concat()
         });
         let [_, highest] = k.subject.table.torque_range_n_m();
         let caption = format!("Largest von Mises stress under {} N·m, over three meshes", torque_text(highest));
-        let header = ["Place", "stress, MPa", "from, MPa", "to, MPa"];
+        let header = ["Place", "stress, MPa", "from, MPa", "to, MPa", "safety against fatigue"];
         Some(PageBlock::table(caption, &header, rows.collect()).of_choice(k.id()))
     };
     let blocks: Vec<PageBlock> = known.iter().filter_map(block).collect();

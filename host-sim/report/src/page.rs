@@ -376,6 +376,8 @@ pub enum FigureBody {
     Drive,
     /// The flexspline with its sleeve, in three dimensions: what the page's animations have of it.
     Sleeve,
+    /// A drawing that is there, as SVG.
+    Svg(String),
     /// Curves and points over an axis, one chart to each choice.
     Lines {
         /// Across.
@@ -695,6 +697,7 @@ fn describe(number: usize, figure: &Figure) -> (Value, Vec<Packed>) {
     let mut value = match &figure.body {
         FigureBody::Drive => json!({ "kind": "drive" }),
         FigureBody::Sleeve => json!({ "kind": "sleeve" }),
+        FigureBody::Svg(svg) => json!({ "kind": "svg", "svg": svg }),
         FigureBody::Lines { x, y, charts } => {
             for (choice, chart) in charts {
                 let columns = chart.columns();

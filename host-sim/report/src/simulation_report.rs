@@ -9,7 +9,8 @@ use serde_json::{Map, json};
 use super::animation::{Animation, Passing, flank_forces};
 use super::drive_figures::{
     BEARS, OfRow, STRESSES, STRESSES_ARE, apart, caution_words, drive_figure, less_mean, mean_arcsec, over_pitch,
-    sharing_axes, sharing_figure, sharing_lines, sheet_section, sleeve_figure, stress_figure, stress_lines,
+    sharing_axes, sharing_figure, sharing_lines, sheet_section, sizes_section, sleeve_figure, stress_figure,
+    stress_lines,
 };
 use super::page::{
     ChartAxis, ChartSeries, Choice, FieldMap, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock, PageQuantity,
@@ -103,7 +104,7 @@ pub fn simulation_report(
     if let Some(first) = sections.first_mut() {
         first.blocks.insert(0, PageBlock::row(known.caption(), &summary.figures(), &FIRST_FIGURES));
     }
-    sections.extend([known.found(), known.load(), known.reading()]);
+    sections.extend([known.found(), known.load(), sizes_section(drive)?, known.reading()]);
     let remarks: Vec<String> = summary.cautions.iter().map(|caution| format!("{}.", caution_words(caution))).collect();
     Ok(Page {
         title: format!("{} along a path", drive.name),

@@ -30,6 +30,7 @@ async function start() {
     const spec = report.figures[id];
     if (spec.kind === "drive") views.push(driveViewer(place, report.animations));
     if (spec.kind === "sleeve") views.push(sleeveViewer(place, report.animations));
+    if (spec.kind === "svg") place.innerHTML = spec.svg;
     if (spec.kind === "lines") views.push(lineChart(place, id, spec));
     if (spec.kind === "field") views.push(fieldMap(place, id, spec));
   }

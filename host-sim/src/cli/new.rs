@@ -14,6 +14,7 @@ use flexspline_design::catalogue::{self, SERIES};
 use flexspline_design::cautions::Caution;
 use flexspline_design::relief::relieve_tips;
 use flexspline_design::simulate::TipContact;
+use flexspline_design::sketch::sketch;
 use flexspline_design::stated::{Stated, TEMPLATE};
 use flexspline_identify::nominal::Nominal;
 use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, MadeDrive, Profile};
@@ -26,7 +27,7 @@ use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, 
 /// from them has its formula in the file. It has a cup and balls in proportion, which are guesses since no catalogue
 /// prints them, and from i = 50 to 160 the compliance that catalogues have beside them (output.contact_compliance);
 /// --plane leaves all of it out. With --like its [data_sheet] is filled in where the catalogue's figures are at hand.
-/// Friction and errors of making are left out. --set flexspline.profile=s makes S-shaped teeth for the cam. A catalogue
+/// Friction and errors of making are left out. Beside the file its sizes are drawn, to scale (.svg). --set flexspline.profile=s makes S-shaped teeth for the cam. A catalogue
 /// model (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for
 /// `diagnose --model` and `synthesize --model`.
 #[derive(Debug, Args)]
@@ -239,10 +240,16 @@ impl New {
             }
         };
         write_whole(&self.file, |out| out.write_all(text.as_bytes())).map_err(bad_input)?;
+        let mut files = vec![self.file.clone()];
+        if kind == NewKind::Drive {
+            let (svg, drawn) = (self.file.with_extension("svg"), sketch(&drive).map_err(bad_input)?);
+            write_whole(&svg, |out| out.write_all(drawn.as_bytes())).map_err(bad_input)?;
+            files.push(svg);
+        }
         let written = NewReport {
             schema_version: 1,
             kind,
-            written: vec![self.file.clone()],
+            written: files,
             drive_hash,
             teeth,
             data_sheet,
@@ -417,8 +424,11 @@ impl New {
         if self.file.is_dir() {
             return refuse("is a folder; allowed: the name of a file");
         }
-        if self.file.symlink_metadata().is_ok() && !self.force {
-            return refuse("is there already; give another name, or --force to replace it");
+        for file in [self.file.clone(), self.file.with_extension("svg")] {
+            if file.symlink_metadata().is_ok() && !self.force {
+                let what = "is there already; give another name, or --force to replace it";
+                return Err(Failure::BadInput(format!("{}: {what}", file.display())));
+            }
         }
         match self.file.parent() {
             Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {

@@ -67,9 +67,13 @@ pub(super) struct Simulate {
     /// Look for the ratcheting torque of the [data_sheet], up to the stated one; up to a minute more
     #[arg(long)]
     ratcheting: bool,
-    /// Stress in root fillet, on bore and flank over three meshes, with its interval; some seconds more
+    /// Stress in root fillet, on bore and flank over three meshes, with its interval, and the safety of steel against
+    /// fatigue; some seconds more
     #[arg(long)]
     stress: bool,
+    /// With --stress: turns of the generator that the flexspline is to bear [default: any number]
+    #[arg(long, value_name = "N", requires = "stress", value_parser = clap::value_parser!(u64).range(1..))]
+    turns: Option<u64>,
     /// Write the deformed mesh of every row to frames/, for ParaView
     #[arg(long)]
     frames: bool,
@@ -171,7 +175,7 @@ impl Simulate {
         simulation.summary.command = context.command.clone();
         if self.stress {
             let _bar = context.progress("stress on three meshes");
-            simulation.summary.stress = stress(&drive, &settings, &simulation)?;
+            simulation.summary.stress = stress(&drive, &settings, &simulation, self.turns)?;
             add_stress(&mut simulation.summary.cautions, &simulation.summary.stress);
         }
         simulation.summary.data_sheet = context.stated()?.map(|stated| {
@@ -307,11 +311,12 @@ pub(super) fn stress(
     drive: &Drive,
     settings: &SimulationSettings,
     simulation: &Simulation,
+    turns: Option<u64>,
 ) -> Result<Vec<PlaceStress>, Failure> {
     let step = simulation.summary.max_von_mises_step;
     let Some(row) = simulation.rows.iter().find(|row| row.step == step) else { return Ok(Vec::new()) };
     let at = (row.generator_rad, row.torque_n_m);
-    stress_by_place(drive, settings.generator, row.temperature_c, at, settings.solver)
+    stress_by_place(drive, settings.generator, row.temperature_c, at, settings.solver, turns)
         .map_err(|error| Failure::Failed(format!("--stress: {error}")))
 }
 

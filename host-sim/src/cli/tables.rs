@@ -267,7 +267,7 @@ impl Tables {
             ..SimulationSettings::new(table.kind, Path::Pitch)
         };
         let run = simulate(drive, &settings, &mut |_| ControlFlow::Continue(())).map_err(refused_or_failed)?;
-        stress(drive, &settings, &run)
+        stress(drive, &settings, &run, None)
     }
 
     /// The report.

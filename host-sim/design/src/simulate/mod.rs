@@ -29,7 +29,9 @@ use flexspline_mechanics::stepping::{Face, Increment, Problem, SolveError, Solve
 
 pub use path::{Path, PathError, PathPoint, read_path};
 pub(crate) use places::judged_fillet_mpa;
-pub use places::{MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, on_mesh, stress_by_place};
+pub use places::{
+    Fatigue, MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, on_mesh, stress_by_place,
+};
 pub use row::Row;
 pub use stress::{PeakStress, peak_stress};
 pub(crate) use summary::SUMMARY_SCHEMA;

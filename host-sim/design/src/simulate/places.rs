@@ -70,6 +70,59 @@ pub struct PlaceStress {
     pub by_mesh_mpa: [f64; MESHES.len()],
     /// The tooth of the flexspline, from 0, that has it on the finest mesh.
     pub tooth: usize,
+    /// How it bears the waves of the generator; of root fillets of steel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fatigue: Option<Fatigue>,
+}
+
+/// How a place bears a stress that comes and goes, of quenched and tempered steel (34CrNiMo6).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fatigue {
+    /// Half of what the stress moves by in a turn of the generator, MPa.
+    pub amplitude_mpa: f64,
+    /// The middle, MPa; positive in tension.
+    pub mean_mpa: f64,
+    /// Turns of the generator that are to be borne; missing where any number is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turns: Option<u64>,
+    /// How many times as large both may be.
+    pub safety: f64,
+}
+
+/// Tensile strength, MPa. *Source*: 34CrNiMo6 +QT, 16 to 40 mm (EN 10083-3: 1100 to 1300 MPa).
+const TENSILE_MPA: f64 = 1100.0;
+/// Share of it that is borne for ever where tension and compression alternate, cycles from which that is so, and how
+/// the share falls below: with the power -1/5 of the cycles. *Source*: FKM Guideline (6th edition, 2012), steels that
+/// are neither case-hardened nor stainless.
+const ALTERNATING: f64 = 0.45;
+const KNEE_CYCLES: f64 = 1e6;
+const KNEE_POWER: f64 = 0.2;
+/// Young's moduli of such steels, MPa. *Source*: EN 10083 and EN 10088 have 200 to 215 GPa; and some room.
+const STEEL_MPA: [f64; 2] = [190e3, 220e3];
+
+impl Fatigue {
+    /// By the line of Goodman, from what alternating stress alone to what a steady one alone may be.
+    fn of([amplitude_mpa, mean_mpa]: [f64; 2], turns: Option<u64>) -> Fatigue {
+        // Two waves pass in a turn.
+        let cycles = turns.map_or(KNEE_CYCLES, |turns| (2.0 * turns as f64).min(KNEE_CYCLES));
+        let bears_mpa = ALTERNATING * TENSILE_MPA * (KNEE_CYCLES / cycles).powf(KNEE_POWER);
+        let used = amplitude_mpa / bears_mpa.min(TENSILE_MPA) + mean_mpa.max(0.0) / TENSILE_MPA;
+        Fatigue { amplitude_mpa, mean_mpa, turns, safety: used.recip() }
+    }
+
+    /// What it is for, and of what.
+    pub fn in_words(&self) -> (String, String) {
+        let Fatigue { amplitude_mpa, mean_mpa, .. } = self;
+        let turns = self.turns.map_or_else(|| "any number of".to_owned(), |turns| turns.to_string());
+        (
+            format!("for {turns} turns of the generator, in steel of {TENSILE_MPA} MPa"),
+            format!(
+                "amplitude {amplitude_mpa:.0}, mean {mean_mpa:.0} MPa (Goodman); 34CrNiMo6 by EN 10083-3, of which \
+                 {:.0} % alternate endlessly (FKM Guideline); the bottom of a cup is not looked at",
+                100.0 * ALTERNATING
+            ),
+        )
+    }
 }
 
 /// Nodes of an edge of one sector: corner, midside, corner, each by local number and the sectors it lies further.
@@ -103,9 +156,13 @@ pub fn fillet_edges(mesh: &WheelMesh) -> Vec<SurfaceEdge> {
     found
 }
 
-/// Largest von Mises stress (MPa) along a free edge of a mesh, by the stretch of the edge at its two points of
-/// integration; `moved` has the displacements of its nodes.
+/// Largest von Mises stress (MPa) along a free edge of a mesh; `moved` has the displacements of its nodes.
 pub fn edge_stress(positions: [[f64; 2]; 3], moved: [[f64; 2]; 3], material: &PlaneStrain) -> f64 {
+    along_edge(positions, moved, material).into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+/// Von Mises stress (MPa), positive in tension, by the stretch of a free edge at its two points of integration.
+fn along_edge(positions: [[f64; 2]; 3], moved: [[f64; 2]; 3], material: &PlaneStrain) -> [f64; 2] {
     let stretched = [0, 1, 2].map(|a| [0, 1].map(|axis| positions[a][axis] + moved[a][axis]));
     let length = |nodes: &[[f64; 2]; 3], x: f64| {
         let slopes = [x - 0.5, -2.0 * x, x + 0.5];
@@ -114,14 +171,36 @@ pub fn edge_stress(positions: [[f64; 2]; 3], moved: [[f64; 2]; 3], material: &Pl
     };
     let PlaneStrain { lambda, mu, .. } = *material;
     let stiffness = 4.0 * mu * (lambda + mu) / (lambda + 2.0 * mu);
-    [-1.0, 1.0]
-        .map(|side| {
-            let x = side / 3f64.sqrt();
-            let strain = length(&stretched, x) / length(&positions, x) - 1.0;
-            material.von_mises([stiffness * strain, 0.0, 0.0])
+    [-1.0, 1.0].map(|side| {
+        let x = side / 3f64.sqrt();
+        let strain = length(&stretched, x) / length(&positions, x) - 1.0;
+        material.von_mises([stiffness * strain, 0.0, 0.0]).copysign(strain)
+    })
+}
+
+/// Positions and displacements of the nodes of an edge at a tooth.
+fn edge_at(mesh: &WheelMesh, u: &[f64], edge: &SurfaceEdge, tooth: usize) -> [[[f64; 2]; 3]; 2] {
+    let nodes = edge.map(|(local, further)| mesh.node((tooth + further) as isize, local));
+    [nodes.map(|n| mesh.nodes[n]), nodes.map(|n| [u[2 * n], u[2 * n + 1]])]
+}
+
+/// Amplitude and mean, MPa, of the stress along each piece of the fillets over a turn of the generator. The wave comes
+/// to every tooth alike: what one sees in turn, all see now.
+fn fillet_cycles(problem: &Problem, state: &State) -> Vec<[f64; 2]> {
+    let mesh = &problem.flexspline;
+    let cycles = |edge: SurfaceEdge| {
+        let of_tooth = |tooth: usize| {
+            let [positions, moved] = edge_at(mesh, &state.u, &edge, tooth);
+            along_edge(positions, moved, &problem.material)
+        };
+        let by_tooth: Vec<[f64; 2]> = (0..mesh.teeth).map(of_tooth).collect();
+        [0, 1].map(|point| {
+            let of = || by_tooth.iter().map(|of| of[point]);
+            let (low, high) = (of().fold(f64::INFINITY, f64::min), of().fold(f64::NEG_INFINITY, f64::max));
+            [0.5 * (high - low), 0.5 * (high + low)]
         })
-        .into_iter()
-        .fold(0.0, f64::max)
+    };
+    fillet_edges(mesh).into_iter().flat_map(cycles).collect()
 }
 
 /// The largest von Mises stress of the flexspline at each place (MPa), and its tooth. `state` has all nodes.
@@ -138,8 +217,8 @@ pub(super) fn largest_of(mesh: &WheelMesh, material: &PlaneStrain, u: &[f64], no
     let fillets = fillet_edges(mesh);
     let in_fillet = |tooth: usize| {
         let of_edge = |edge: &SurfaceEdge| {
-            let nodes = edge.map(|(local, further)| mesh.node((tooth + further) as isize, local));
-            edge_stress(nodes.map(|n| mesh.nodes[n]), nodes.map(|n| [u[2 * n], u[2 * n + 1]]), material)
+            let [positions, moved] = edge_at(mesh, u, edge, tooth);
+            edge_stress(positions, moved, material)
         };
         fillets.iter().map(of_edge).fold(0.0, f64::max)
     };
@@ -151,7 +230,8 @@ pub(super) fn largest_of(mesh: &WheelMesh, material: &PlaneStrain, u: &[f64], no
     [most(&in_fillet), most(&|tooth| of_nodes(&bore, tooth)), most(&|tooth| of_nodes(&flanks, tooth))]
 }
 
-/// The drive at rest at a generator angle under a load, on each of the meshes.
+/// The drive at rest at a generator angle under a load, on each of the meshes; its fillets are to bear so many `turns`
+/// of the generator, or any number.
 ///
 /// # Errors
 /// No equilibrium.
@@ -161,19 +241,25 @@ pub fn stress_by_place(
     temperature_c: f64,
     (generator_rad, torque_n_m): (f64, f64),
     settings: SolverSettings,
+    turns: Option<u64>,
 ) -> Result<Vec<PlaceStress>, SolveError> {
     let mut by_mesh = [[(0.0, 0); 3]; MESHES.len()];
+    let mut cycles = Vec::new();
     for (found, refine) in by_mesh.iter_mut().zip(MESHES) {
-        *found =
-            on_mesh(drive, kind, temperature_c, (generator_rad, torque_n_m), refine, settings, |problem, state| {
-                largest_by_place(problem, state)
-            })?;
+        let at = (generator_rad, torque_n_m);
+        (*found, cycles) = on_mesh(drive, kind, temperature_c, at, refine, settings, |problem, state| {
+            (largest_by_place(problem, state), fillet_cycles(problem, state))
+        })?;
     }
+    let is_steel = (STEEL_MPA[0]..=STEEL_MPA[1]).contains(&drive.material.youngs_modulus_mpa);
+    let all = cycles.into_iter().filter(|_| is_steel).map(|cycle| Fatigue::of(cycle, turns));
+    let hardest = all.min_by(|a, b| a.safety.total_cmp(&b.safety));
     let of = |(k, place): (usize, Place)| {
         let by_mesh_mpa = by_mesh.map(|found| found[k].0);
         let (von_mises_mpa, half) = of_meshes(by_mesh_mpa);
         let interval_mpa = [(von_mises_mpa - half).max(0.0), von_mises_mpa + half];
-        PlaceStress { place, von_mises_mpa, interval_mpa, by_mesh_mpa, tooth: by_mesh[MESHES.len() - 1][k].1 }
+        let (tooth, fatigue) = (by_mesh[MESHES.len() - 1][k].1, hardest.filter(|_| place == Place::RootFillet));
+        PlaceStress { place, von_mises_mpa, interval_mpa, by_mesh_mpa, tooth, fatigue }
     };
     Ok(Place::ALL.into_iter().enumerate().map(of).collect())
 }
@@ -272,6 +358,45 @@ mod tests {
             let MeshDensity([_, space_columns, _, _, fillet_elements, _]) = density;
             assert_eq!(edges.len(), 2 * (space_columns + fillet_elements));
         }
+    }
+
+    /// What a tooth sees while the generator turns is what all of them see of it standing.
+    #[test]
+    fn a_tooth_sees_in_turn_what_all_see_at_once() {
+        let (drive, settings) = (Drive::hhd_95(), SolverSettings::default());
+        let at = |generator_rad: f64, teeth: fn(usize) -> std::ops::Range<usize>| {
+            let at = (generator_rad, 40.0);
+            on_mesh(&drive, GeneratorKind::Cam, 20.0, at, 1, settings, |problem, state| {
+                let edge = fillet_edges(&problem.flexspline)[0];
+                let of = |tooth: usize| {
+                    let [positions, moved] = edge_at(&problem.flexspline, &state.u, &edge, tooth);
+                    along_edge(positions, moved, &problem.material)[0]
+                };
+                (teeth(problem.flexspline.teeth).map(of).collect(), fillet_cycles(problem, state)[0])
+            })
+            .unwrap()
+        };
+        let (all, [amplitude, mean]): (Vec<f64>, [f64; 2]) = at(0.0, |teeth| 0..teeth);
+        let in_turn = (0..8).map(|k| at(f64::from(k) * std::f64::consts::PI / 8.0, |_| 0..1).0[0]);
+        for (k, stress) in in_turn.enumerate() {
+            // The flexspline stands: half a turn of the generator has 94 teeth.
+            let like = all[(188 - (k * 188 / 16) % 188) % 188];
+            assert!((stress - mean).abs() < 1.02 * amplitude, "{k}: {stress} of {mean} and {amplitude}");
+            assert!((stress - like).abs() < 0.25 * amplitude, "{k}: {stress} for {like}");
+        }
+        assert!(amplitude > 50.0 && all.iter().any(|of| *of > mean + 0.99 * amplitude));
+    }
+
+    #[test]
+    fn a_stress_that_comes_and_goes_is_borne_by_the_line_of_goodman() {
+        let safety = |cycle, turns| Fatigue::of(cycle, turns).safety;
+        assert!((safety([247.5, 0.0], None) - 2.0).abs() < 1e-12, "half of 45 % of 1100 MPa");
+        assert!((safety([247.5, 275.0], None) - 4.0 / 3.0).abs() < 1e-12);
+        assert_eq!(safety([247.5, -100.0], None), safety([247.5, 0.0], None), "pressure helps, and is not counted");
+        assert_eq!(safety([247.5, 0.0], Some(500_000)), safety([247.5, 0.0], Some(1 << 40)));
+        let fewer = safety([247.5, 0.0], Some(500_000 / 32));
+        assert!((fewer - 4.0).abs() < 1e-5, "a 32nd of the cycles, twice the stress: {fewer}");
+        assert!((safety([1100.0, 0.0], Some(1)) - 1.0).abs() < 1e-12, "no more than breaks it at once");
     }
 
     /// A rectangle's edge that is stretched and turned has Hooke's stress of plane strain, and none of the turn.

@@ -229,6 +229,10 @@ impl Summary {
                 (format!("stress, {}", stress.place.in_words()), format!("{low:.0} to {high:.0}, over three meshes"));
             let tooth = format!("of the flexspline, at tooth {}", stress.tooth);
             put(&name, Some(stress.von_mises_mpa), mpa, &caveat, &tooth);
+            let Some(fatigue) = stress.fatigue else { continue };
+            let name = format!("safety against fatigue, {}", stress.place.in_words());
+            let (caveat, cycle) = fatigue.in_words();
+            put(&name, Some(fatigue.safety), ("", 2), &caveat, &cycle);
         }
         put("largest flank pressure", Some(self.peak_flank_pressure_mpa), mpa, "", "of any tooth, of all rows");
         let bore = "of generator on bore, of all rows";

@@ -24,5 +24,7 @@ mod tube;
 
 pub(crate) use coupling::Addition;
 pub use model::{Flexspline3d, RimHarmonic, Rollers};
+pub use plate::PlateEdge;
 pub use shape::Station;
 pub(crate) use tooth::pair_compliance;
+pub use tube::End;
