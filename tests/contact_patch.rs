@@ -235,9 +235,9 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
                     output_rad: run.state().output_rad,
                     leans: &[],
                 };
-                flanks.start_friction(pair, before, &Vec::new(), &mut layout.points);
+                flanks.start_friction((pair, before), &Vec::new(), &mut layout.points);
             }
-            let Some(here) = flanks.evaluate(pair, at, law, &layout.points) else { continue };
+            let Some(here) = flanks.evaluate((pair, at), law, &layout.points) else { continue };
             touching += 1;
             let nodes = |pair: FlankPair| -> (Vec<usize>, Vec<usize>) {
                 (flanks.fs_nodes(pair).collect(), flanks.cs_nodes(pair).collect())
@@ -256,11 +256,11 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
                     v[2 * n + 1] += by * direction[2 * (fs.len() + k) + 1];
                 }
                 let at = Configuration { u: &u, v: &v, output_rad: output + by * output_direction, leans: &[] };
-                let all = flanks.evaluate(pair, at, law, points).unwrap();
+                let all = flanks.evaluate((pair, at), law, points).unwrap();
                 // The peak of a single point is its pressure.
                 let energy = points
                     .iter()
-                    .filter_map(|p| Some((p.weight, flanks.evaluate(pair, at, law, &[*p])?.peak)))
+                    .filter_map(|p| Some((p.weight, flanks.evaluate((pair, at), law, &[*p])?.peak)))
                     .map(|(weight, pressure)| 0.5 * weight * pressure * pressure / law.stiffness)
                     .sum();
                 Flank { energy, force: all.force, torque: all.torque }
@@ -278,7 +278,7 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
                             u[2 * n + 1] += by * direction[2 * k + 1];
                         }
                         let at = Configuration { u: &u, v: &v, output_rad: output, leans: &[] };
-                        flanks.evaluate(pair, at, law, &[**p]).is_some()
+                        flanks.evaluate((pair, at), law, &[**p]).is_some()
                     };
                     touches(1e-7) && touches(-1e-7)
                 })
@@ -288,7 +288,7 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
                 continue;
             }
             let (plus, minus) = (step(h, &steady), step(-h, &steady));
-            let middle = flanks.evaluate(pair, at, law, &steady).unwrap();
+            let middle = flanks.evaluate((pair, at), law, &steady).unwrap();
             let scale = norm(&middle.force) * norm(&direction) / (direction.len() as f64).sqrt();
             if friction == 0.0 {
                 let by_difference = (plus.energy - minus.energy) / (2.0 * h);

@@ -237,7 +237,7 @@ impl<'m> Pressed<'m> {
         let mut path = Vec::new();
         for slide in SLIDES {
             let mut points = self.flanks.layout(PAIR, configuration(&u, &v)).points;
-            self.flanks.start_friction(PAIR, configuration(&u, &v), &history, &mut points);
+            self.flanks.start_friction((PAIR, configuration(&u, &v)), &history, &mut points);
             let stands = self.held(friction, slide);
             let by = [stands[0] - stood[0], stands[1] - stood[1]];
             u.chunks_exact_mut(2).for_each(|u| (u[0], u[1]) = (u[0] + by[0], u[1] + by[1]));
@@ -248,7 +248,7 @@ impl<'m> Pressed<'m> {
                 let mut system = System::new(self.unknowns);
                 self.tooth.add(&self.material, &u, |k| self.rows[0][k], &mut system);
                 self.space.add(&self.material, &v, |k| self.rows[1][k], &mut system);
-                let pair = self.flanks.evaluate(PAIR, configuration(&u, &v), law, &points);
+                let pair = self.flanks.evaluate((PAIR, configuration(&u, &v)), law, &points);
                 let fs = self.flanks.fs_nodes(PAIR).flat_map(|n| [2 * n, 2 * n + 1]).map(|k| self.rows[0][k]);
                 let cs = self.flanks.cs_nodes(PAIR).flat_map(|n| [2 * n, 2 * n + 1]).map(|k| self.rows[1][k]);
                 let rows: Vec<Option<usize>> = fs.chain(cs).collect();
@@ -281,7 +281,7 @@ impl<'m> Pressed<'m> {
                 }
             };
             let at = configuration(&u, &v);
-            history = self.flanks.friction_history(PAIR, at, law, &points);
+            history = self.flanks.friction_history((PAIR, at), law, &points);
             let mut sticks = [0.0; 2];
             let mut tractions = history.iter();
             self.flanks.gaps(PAIR, at, &points, &mut |gap, _, weight| {

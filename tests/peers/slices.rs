@@ -232,7 +232,7 @@ impl Loaded {
     fn bears(&self, state: &State) -> Vec<Bears> {
         let (flanks, at) = (self.flanks(), configuration(state));
         let of_pair = |pair: FlankPair| {
-            let found = flanks.evaluate(pair, at, LAW, &flanks.layout(pair, at).points)?;
+            let found = flanks.evaluate((pair, at), LAW, &flanks.layout(pair, at).points)?;
             (found.load > 0.0).then_some((pair, found.load, found.torque))
         };
         flanks.near_pairs(at, NEAR_MM).into_iter().filter_map(of_pair).collect()
@@ -576,7 +576,7 @@ impl<'l> Deck<'l> {
                 }
             }
             let at = Configuration { u: &u, v: &v, output_rad, leans: &[] };
-            let found = flanks.evaluate(pair, at, LAW, &flanks.layout(pair, at).points);
+            let found = flanks.evaluate((pair, at), LAW, &flanks.layout(pair, at).points);
             found.map_or(0.0, |found| found.load)
         };
         let loads: Vec<f64> = (0..=BINS * STEPS).map(at_step).collect();
@@ -621,7 +621,7 @@ fn found(ccx: &Path, out: &Path, case: Case) -> Result<Found, String> {
         torques.push([deck.torque(&tables, step)?, ours]);
         for (pair, load, _) in bears {
             let at = configuration(state);
-            let mut over_mean = flanks.load_over_mean(pair, at, LAW, &flanks.layout(pair, at).points);
+            let mut over_mean = flanks.load_over_mean((pair, at), LAW, &flanks.layout(pair, at).points);
             if over_mean.is_empty() {
                 over_mean = vec![1.0; BINS + 1];
             }

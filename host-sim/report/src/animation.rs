@@ -288,7 +288,7 @@ pub(super) fn flank_forces(problem: &Problem, state: &State, wanted: impl Fn(usi
     let width = problem.drive.flexspline.width_mm;
     let of_pair = |pair: FlankPair| {
         let layout = flanks.layout(pair, at);
-        let contact = flanks.evaluate(pair, at, law, &layout.points)?;
+        let contact = flanks.evaluate((pair, at), law, &layout.points)?;
         let [fx, fy] = contact.resultant;
         let force = fx.hypot(fy);
         // From the frame of the output to that of the tooth; the force on the tooth is the reaction.

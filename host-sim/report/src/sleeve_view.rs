@@ -131,8 +131,8 @@ fn load_across_face(problem: &Problem, state: &State) -> Vec<f64> {
     let law = FlankLaw { stiffness: problem.settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
     let loads = flanks.near_pairs(at, NEAR_MM).into_iter().filter_map(|pair| {
         let layout = flanks.layout(pair, at);
-        let load = flanks.evaluate(pair, at, law, &layout.points)?.load;
-        Some((load, flanks.load_over_mean(pair, at, law, &layout.points)))
+        let load = flanks.evaluate((pair, at), law, &layout.points)?.load;
+        Some((load, flanks.load_over_mean((pair, at), law, &layout.points)))
     });
     let most = loads.max_by(|a, b| a.0.total_cmp(&b.0));
     let along = most.map_or_else(Vec::new, |(_, along)| along.into_iter().map(rounded).collect::<Vec<_>>());

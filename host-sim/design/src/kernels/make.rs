@@ -233,7 +233,7 @@ impl Forces {
         let width = problem.drive.flexspline.width_mm;
         for pair in flanks.near_pairs(at, NEAR_MM) {
             let layout = flanks.layout(pair, at);
-            let Some(contact) = flanks.evaluate(pair, at, law, &layout.points) else { continue };
+            let Some(contact) = flanks.evaluate((pair, at), law, &layout.points) else { continue };
             let [fx, fy] = contact.resultant;
             let size = fx.hypot(fy);
             let point = contact.attack.map(|x| x / size);

@@ -131,7 +131,7 @@ fn pairs(problem: &Problem, state: &State) -> Vec<BearingPair> {
     let modulus_mpa = problem.contact_modulus_mpa();
     let of_pair = |pair: flexspline_mechanics::contact::FlankPair| {
         let layout = flanks.layout(pair, at);
-        let place = flanks.bearing_place(pair, at, law, &layout.points, modulus_mpa)?;
+        let place = flanks.bearing_place((pair, at), law, &layout.points, modulus_mpa)?;
         let phi = (problem.flexspline.sector_angle(pair.tooth) - state.generator_rad).rem_euclid(TAU);
         let lobe = (phi / PI).round();
         Some(BearingPair {

@@ -747,7 +747,13 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
-    let offsets = offsets(files, &rows, &model, known.noise, &readings, prior.nominal.ratio);
+    let mut offsets = offsets(files, &rows, &model, known.noise);
+    for offset in &mut offsets {
+        // The output is known no better than the generator.
+        let zero = readings.iter().find(|zero| zero.name == ZERO && zero.file == offset.file);
+        let by_zero = zero.map_or(0.0, |zero| zero.std.to_radians() / prior.nominal.ratio * ARCSEC_PER_RAD);
+        offset.std = offset.std.hypot(by_zero);
+    }
     readings.extend(offsets);
     notes.extend(split.then(|| SPLIT_BY.to_owned()));
     let of_whom = |changes: Vec<(PartName, f64)>| {
@@ -848,29 +854,18 @@ const SPLIT_BY: &str = "the split takes for an encoder's what changes neither wi
                         waves of displaced wheels at least half does; an error of a gear that does not counts as the \
                         encoder's";
 
-/// The zero of the output in each file, which is known no better than that of the generator.
-fn offsets(
-    files: &[Recording],
-    rows: &Rows,
-    model: &Model,
-    noise: RowNoise,
-    zeros: &[Reading],
-    ratio: f64,
-) -> Vec<Reading> {
+/// The zero of the output in each file.
+fn offsets(files: &[Recording], rows: &Rows, model: &Model, noise: RowNoise) -> Vec<Reading> {
     let mut sums = vec![(0.0, 0.0); files.len()];
     for row in &rows.rows {
         sums[row.at.log].0 += row.left_arcsec - model.adds_arcsec(&row.at);
         sums[row.at.log].1 += 1.0;
     }
-    let by_generator = |file: &str| {
-        let zero = zeros.iter().find(|zero| zero.name == ZERO && zero.file.as_deref() == Some(file));
-        zero.map_or(0.0, |zero| zero.std.to_radians() / ratio * ARCSEC_PER_RAD)
-    };
     let offset = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| Reading {
         name: OFFSET,
         file: Some(file.file.clone()),
         value: mean + sum / f64::max(count, 1.0),
-        std: (noise.of_a_row() / f64::max(count, 1.0)).sqrt().hypot(by_generator(&file.file)),
+        std: (noise.of_a_row() / f64::max(count, 1.0)).sqrt(),
     };
     files.iter().zip(sums).zip(&rows.means_arcsec).map(offset).collect()
 }

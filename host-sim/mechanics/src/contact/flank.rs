@@ -215,6 +215,9 @@ pub struct Configuration<'s> {
     pub leans: &'s [Lean],
 }
 
+/// A pair, and what it is evaluated at.
+pub type PairAt<'s> = (FlankPair, Configuration<'s>);
+
 /// Displacements of a pair's flank nodes in local frames (tooth frame and space frame, mirrored for the minus side).
 struct LocalField {
     fs: Vec<[f64; 2]>,
@@ -417,7 +420,7 @@ impl<'a> FlankContact<'a> {
 
     /// Load of a pair over its mean, at equal steps along the face and growing away from what holds the flexspline;
     /// nothing where the pair is open or its load is even.
-    pub fn load_over_mean(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> Vec<f64> {
+    pub fn load_over_mean(&self, (pair, at): PairAt<'_>, law: FlankLaw, points: &[FlankPoint]) -> Vec<f64> {
         let field = self.local_field(pair, at);
         let bearing = self.bearing(pair, &field, law, points);
         match (&field.across, bearing) {
@@ -555,13 +558,7 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Sets where each point stood at the start of the increment, for friction.
-    pub fn start_friction(
-        &self,
-        pair: FlankPair,
-        at: Configuration,
-        history: &FrictionHistory,
-        points: &mut [FlankPoint],
-    ) {
+    pub fn start_friction(&self, (pair, at): PairAt<'_>, history: &FrictionHistory, points: &mut [FlankPoint]) {
         let field = self.local_field(pair, at);
         for point in points {
             let x = self.seen_from_space(&field, &point.place);
@@ -572,14 +569,8 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Tangential tractions at the end of an increment; nothing of a pair that is open.
-    pub fn friction_history(
-        &self,
-        pair: FlankPair,
-        at: Configuration,
-        law: FlankLaw,
-        points: &[FlankPoint],
-    ) -> FrictionHistory {
-        let Some((_, touches)) = self.touches(pair, at, law, points) else { return FrictionHistory::new() };
+    pub fn friction_history(&self, (pair, at): PairAt<'_>, law: FlankLaw, points: &[FlankPoint]) -> FrictionHistory {
+        let Some((_, touches)) = self.touches((pair, at), law, points) else { return FrictionHistory::new() };
         let history = |(point, touch): (&FlankPoint, &BearingPoint)| {
             let pressure = (-law.stiffness * touch.place.gap).max(0.0);
             (point.arc, traction(law, pressure, point, touch.foot_arc).0)
@@ -591,26 +582,24 @@ impl<'a> FlankContact<'a> {
     /// the load along the face is largest. Nothing of a pair that is open.
     pub(crate) fn peak_pressure_mpa(
         &self,
-        pair: FlankPair,
-        at: Configuration,
+        (pair, at): PairAt<'_>,
         law: FlankLaw,
         points: &[FlankPoint],
         modulus_mpa: f64,
     ) -> f64 {
-        self.touches(pair, at, law, points)
+        self.touches((pair, at), law, points)
             .map_or(0.0, |(bearing, touches)| self.peak_of(&bearing, &touches, modulus_mpa))
     }
 
     /// Where a pair bears, whether on flanks or on tips; nothing of a pair that is open.
     pub fn bearing_place(
         &self,
-        pair: FlankPair,
-        at: Configuration,
+        (pair, at): PairAt<'_>,
         law: FlankLaw,
         points: &[FlankPoint],
         modulus_mpa: f64,
     ) -> Option<BearingPlace> {
-        let (bearing, touches) = self.touches(pair, at, law, points)?;
+        let (bearing, touches) = self.touches((pair, at), law, points)?;
         let (tooth, space) = (&self.tooth, &self.space);
         let tooth_tip_from = tooth.arc_at(tooth.junction_radius) - tooth.rounding_radius;
         // On the circular spline the tip lies inward.
@@ -633,8 +622,7 @@ impl<'a> FlankContact<'a> {
     /// How a pair bears, and each of its points; nothing of a pair that is open.
     fn touches(
         &self,
-        pair: FlankPair,
-        at: Configuration,
+        (pair, at): PairAt<'_>,
         law: FlankLaw,
         points: &[FlankPoint],
     ) -> Option<(Bearing, Vec<BearingPoint>)> {
@@ -661,8 +649,7 @@ impl<'a> FlankContact<'a> {
     /// its weight; with the offsets along the face, where there are any.
     pub fn gaps(
         &self,
-        pair: FlankPair,
-        at: Configuration,
+        (pair, at): PairAt<'_>,
         points: &[FlankPoint],
         report: &mut impl FnMut(f64, f64, f64),
     ) -> Option<Across> {
@@ -677,22 +664,15 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Forces and tangent of a pair; nothing while it is open.
-    pub fn evaluate(
-        &self,
-        pair: FlankPair,
-        at: Configuration,
-        law: FlankLaw,
-        points: &[FlankPoint],
-    ) -> Option<PairContribution> {
+    pub fn evaluate(&self, (pair, at): PairAt<'_>, law: FlankLaw, points: &[FlankPoint]) -> Option<PairContribution> {
         let mut smallest_gap = f64::INFINITY;
-        self.evaluate_with_gap(pair, at, law, points, &mut smallest_gap)
+        self.evaluate_with_gap((pair, at), law, points, &mut smallest_gap)
     }
 
     /// [`FlankContact::evaluate`], and the smallest gap of the points in `smallest_gap` (mm).
     pub(crate) fn evaluate_with_gap(
         &self,
-        pair: FlankPair,
-        at: Configuration,
+        (pair, at): PairAt<'_>,
         law: FlankLaw,
         points: &[FlankPoint],
         smallest_gap: &mut f64,
@@ -965,8 +945,8 @@ mod tests {
             let gap = flanks.smallest_gap(PAIR, at(0.0));
             let closing = -(gap + 1e-4) / flanks.space.lever();
             let layout = flanks.layout(PAIR, at(closing));
-            assert!(flanks.evaluate(PAIR, at(0.0), law, &layout.points).is_none());
-            let pressed = flanks.evaluate(PAIR, at(closing), law, &layout.points).unwrap();
+            assert!(flanks.evaluate((PAIR, at(0.0)), law, &layout.points).is_none());
+            let pressed = flanks.evaluate((PAIR, at(closing)), law, &layout.points).unwrap();
             // The space was turned back onto the plus side of the tooth: it is pushed forward.
             assert!(pressed.torque > 0.0 && pressed.corner > 0.0 && pressed.peak > 0.0);
             assert!(pressed.peak <= 1e6 * 1.01e-4, "{} MPa", pressed.peak);
@@ -974,7 +954,7 @@ mod tests {
             assert!(moment.is_finite());
             // Twice the penalty, twice the force.
             let stiffer = FlankLaw { stiffness: 2e6, ..law };
-            let twice = flanks.evaluate(PAIR, at(closing), stiffer, &layout.points).unwrap();
+            let twice = flanks.evaluate((PAIR, at(closing)), stiffer, &layout.points).unwrap();
             assert!((twice.torque / pressed.torque - 2.0).abs() < 1e-12);
         });
     }
@@ -998,7 +978,7 @@ mod tests {
             let of = |u: &[f64], output_rad: f64, slope: f64| {
                 let leans = lean(slope);
                 flanks
-                    .evaluate(PAIR, Configuration { u, v: &v, output_rad, leans: &leans }, law, &layout.points)
+                    .evaluate((PAIR, Configuration { u, v: &v, output_rad, leans: &leans }), law, &layout.points)
                     .unwrap()
             };
             let here = of(&u, closing, slope);

@@ -19,6 +19,6 @@ pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
 pub(crate) use face::{Across, Bearing, FaceLaw, Lean};
 pub use flank::{
     AlongFace, BearingPlace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPlace, FlankPoint,
-    FrictionHistory, PairContribution, SlipPoint,
+    FrictionHistory, PairAt, PairContribution, SlipPoint,
 };
 pub use quadrature::gauss_legendre;

@@ -75,7 +75,7 @@ impl NearPairs {
                 if friction {
                     let empty = Vec::new();
                     let history = from.friction.get(&(pair.tooth, pair.side)).unwrap_or(&empty);
-                    flanks.start_friction(pair, configuration(from), history, &mut layout.points);
+                    flanks.start_friction((pair, configuration(from)), history, &mut layout.points);
                 }
                 place.insert(NearPair { layout, open_until: 0.0 });
             }
@@ -100,7 +100,7 @@ impl NearPairs {
                 continue;
             }
             let mut gap = f64::INFINITY;
-            match flanks.evaluate_with_gap(pair, at, law, &near.layout.points, &mut gap) {
+            match flanks.evaluate_with_gap((pair, at), law, &near.layout.points, &mut gap) {
                 Some(contact) => report(pair, &contact),
                 None => near.open_until = self.moved + gap,
             }
@@ -117,7 +117,7 @@ impl NearPairs {
     ) -> f64 {
         let touching = self.pairs.iter().filter(|(_, near)| self.moved >= near.open_until);
         let peak = |(pair, near): (&FlankPair, &NearPair)| {
-            flanks.peak_pressure_mpa(*pair, at, law, &near.layout.points, modulus_mpa)
+            flanks.peak_pressure_mpa((*pair, at), law, &near.layout.points, modulus_mpa)
         };
         touching.map(peak).fold(0.0, f64::max)
     }
@@ -146,7 +146,9 @@ impl NearPairs {
     ) -> BTreeMap<(usize, crate::drive::Side), crate::contact::FrictionHistory> {
         self.pairs
             .iter()
-            .map(|(&pair, near)| ((pair.tooth, pair.side), flanks.friction_history(pair, at, law, &near.layout.points)))
+            .map(|(&pair, near)| {
+                ((pair.tooth, pair.side), flanks.friction_history((pair, at), law, &near.layout.points))
+            })
             .filter(|(_, history)| history.iter().any(|(_, traction)| *traction != 0.0))
             .collect()
     }
@@ -174,7 +176,7 @@ impl NearPairs {
             let mut pairs = Vec::new();
             let mut add = |pair, layout: &FlankLayout| {
                 let mut points = Vec::with_capacity(layout.points.len());
-                let across = flanks.gaps(pair, at, &layout.points, &mut |gap, rate, weight| {
+                let across = flanks.gaps((pair, at), &layout.points, &mut |gap, rate, weight| {
                     points.push(RigidPoint { gap, rate, weight });
                 });
                 pairs.push((across, points));
