@@ -44,8 +44,8 @@ fn headline(c: &Calibration) -> Headline {
     let words = format!(
         "With the table of this unit the residual is {{}} rms of {{}} over all rows{}; it adds {kept} part{} to the \
          prior model.",
-        if kept == 1 { "" } else { "s" },
-        if c.has_delay() { ", the delay between the readings taken out" } else { "" }
+        if c.has_delay() { ", the delay between the readings taken out" } else { "" },
+        if kept == 1 { "" } else { "s" }
     );
     Headline::new(
         RichText::filled(&words, &[(c.core.rms_after_arcsec, 3), (c.core.rms_before_arcsec, 3)]),

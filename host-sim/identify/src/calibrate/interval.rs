@@ -254,8 +254,8 @@ pub struct ModelUncertainty {
 impl ModelUncertainty {
     /// From the rows of the fit, of logs with these delays as numbers of their columns, which `rows` are without unless
     /// the model has them; `coarse_rad` is the step of the resolution at the output, and `left_out_arcsec` what fits
-    /// leave in rows that were left out of them. Parts `beside` the model are zero in it, each known to the standard
-    /// deviation given with it, arcsec, before the rows.
+    /// leave in rows that were left out of them. Parts of `beside` are known to no less than the standard deviation
+    /// given with them, arcsec, before the rows; those that the model does not have are zero in it.
     pub(super) fn of(
         rows: &[Row],
         (model, beside): (&Model, &[(PartName, f64)]),
@@ -272,11 +272,12 @@ impl ModelUncertainty {
         let mut priors: Vec<Prior> = Vec::new();
         for part in &parts {
             let of_part = model.of(*part).map_or(&[][..], |of| &model.coefficients[of]);
-            let expected = expected_arcsec(*part, scales, of_part).powi(2).max(f64::MIN_POSITIVE);
+            let open = beside.iter().find(|(other, _)| other == part).map_or(0.0, |(_, arcsec)| *arcsec);
+            let expected = expected_arcsec(*part, scales, of_part).max(open).powi(2).max(f64::MIN_POSITIVE);
             let known = of_part.iter().zip(weights(*part));
             priors.extend(known.map(|(fitted, weight)| before(-fitted, weight / expected, of_a_row)));
         }
-        for (part, arcsec) in beside {
+        for (part, arcsec) in beside.iter().filter(|(part, _)| model.of(*part).is_none()) {
             parts.push(*part);
             let weights = weights(*part).into_iter();
             priors.extend(weights.map(|weight| before(0.0, f64::max(weight, 1.0) / arcsec.powi(2), of_a_row)));

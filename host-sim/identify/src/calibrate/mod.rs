@@ -292,14 +292,14 @@ fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> Vec<State> {
     states.into_iter().map(|at| State { speed_rad_s: at.way * pace, ..at }).collect()
 }
 
-/// Of wind-up and waves of the output, where the load goes with the output's angle, those that a model does not have,
-/// with the size that they may have all the same, arcsec: what was fitted may be theirs, all of it.
+/// Wind-up and waves of the output, where the load goes with the output's angle, with the size that they may have,
+/// whichever a model has, arcsec: what was fitted may be the other's, all of it.
 fn collinear(rows: &Rows, model: &Model, correlation: f64) -> Vec<(PartName, f64)> {
     let both = [PartName::WindUp, PartName::OutputAngle];
     let fitted = model.chosen.iter().filter(|chosen| both.contains(&chosen.part));
     let largest = fitted.map(|chosen| size(rows, model, *chosen)).fold(0.0, f64::max);
-    let others = both.into_iter().filter(|part| correlation > TURNS_WITH_THE_OUTPUT && model.of(*part).is_none());
-    others.map(|part| (part, usual_arcsec(part, &model.scales).max(largest))).collect()
+    let open = both.into_iter().filter(|_| correlation > TURNS_WITH_THE_OUTPUT);
+    open.map(|part| (part, usual_arcsec(part, &model.scales).max(largest))).collect()
 }
 
 /// Says so where the load goes with the output's angle, and the rows tell neither alone as well as both together, to

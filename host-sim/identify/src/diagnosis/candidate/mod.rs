@@ -124,7 +124,7 @@ impl<'a> Excitation<'a> {
             Need::Teeth => self.nominal.teeth.is_some(),
             Need::Turns => rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI),
             Need::Load => self.scales.load > 0.0,
-            Need::Spring => self.nominal.wind_up_arcsec(1.0) > 0.0,
+            Need::Spring => self.nominal.wind_up_arcsec(1.0) > LEAST_WIND_UP_ARCSEC,
             Need::Temperature => rows.recorded.temperature,
             Need::TemperatureSpan => {
                 let (low, high) = least_and_most(rows.temperature.iter().copied());
@@ -421,6 +421,8 @@ pub(crate) struct Acts {
     pub tolerance_of: Option<&'static str>,
 }
 
+/// A drive winds up by more than this under 1 N·m, arcsec: of the catalogue the stiffest is a hundredth as stiff.
+const LEAST_WIND_UP_ARCSEC: f64 = 1e-4;
 /// Size of all deviations over that of the law, at most: beyond, the law is there for its deviations.
 const MOST_NUISANCE: f64 = 0.9;
 /// Size of all deviations over that of the law, at most, for laws that are well known, and whose deviations are those
