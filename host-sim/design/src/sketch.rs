@@ -47,14 +47,10 @@ pub fn sketch(drive: &Drive) -> Result<String, MeshError> {
     let y = |mm: f64| ROOM_PX + px_per_mm * (outer - mm);
     let rectangle = |[from, to, inner, outer]: &Piece| {
         let (width, height) = (px_per_mm * (to - from), px_per_mm * (outer - inner));
-        format!(
-            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"currentColor\" \
-             fill-opacity=\".12\"/>",
-            x(*from),
-            y(*outer)
-        )
+        format!("<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>", x(*from), y(*outer))
     };
-    let mut drawn: Vec<String> = pieces.iter().map(rectangle).collect();
+    let filled: String = pieces.iter().map(rectangle).collect();
+    let mut drawn = vec![format!("<g fill=\"currentColor\" fill-opacity=\".12\">{filled}</g>")];
     let end = x(most) + ROOM_PX;
     drawn.push(format!("<path d=\"M{ROOM_PX} {:.1}H{end:.1}\" stroke-dasharray=\"12 3 2 3\"/>", y(0.0)));
     let mut words = Vec::new();
@@ -72,12 +68,8 @@ pub fn sketch(drive: &Drive) -> Result<String, MeshError> {
     let mut line = 0.0;
     for (what, radius) in diameters {
         line = y(radius).max(line + LINE_PX);
-        drawn.push(format!(
-            "<path d=\"M{:.1} {:.1}H{end:.1}L{:.1} {line:.1}\" stroke-opacity=\".4\"/>",
-            x(width),
-            y(radius),
-            end + ROOM_PX
-        ));
+        let leads = format!("M{:.1} {:.1}H{end:.1}L{:.1} {line:.1}", x(width), y(radius), end + ROOM_PX);
+        drawn.push(format!("<path d=\"{leads}\" stroke-opacity=\".4\"/>"));
         words.push((end + ROOM_PX + 4.0, line + 4.0, format!("⌀ {:.3} {what}", 2.0 * radius)));
     }
     let below = y(0.0) + ROOM_PX;

@@ -1,56 +1,17 @@
-//! Reasons why a table leaves much of measured rows: the generator's zero is whole turns off, the torque counts the
-//! other way, or the load at each angle is another than when the table was made.
-//!
-//! A table of a drive whose error does not repeat in each turn holds another error a turn later. A motor that was homed
-//! in another turn reads the same within its turn, and the table adds the error of another place: it may leave more
-//! than there was. Each reason is held against the rows by what the table would leave with it.
+//! Reasons why a table leaves much of measured rows: the torque counts the other way, or the load at each angle is
+//! another than when the table was made. Each is held against the rows by what the table would leave with it.
 
 use flexspline::{Prediction, Table};
-use serde::Serialize;
 
 use super::replay::{MeasuredRow, by_core};
 use crate::calibrate::TURNS_WITH_THE_OUTPUT;
 use crate::least_squares::FreeSpan;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Rows that a turn is looked for with, about.
+/// Rows that are looked at, about.
 const LOOKED_AT: usize = 2000;
-/// The zero is said to be off if another turn leaves less than this share of what the table leaves as the rows
-/// stand. *Guess*: of an output eccentric once a turn a zero that is off by a turn of hundred leaves a sixteenth of it,
-/// which is next to nothing beside a residual.
+/// A reason has to leave less than this share of what the table leaves as the rows stand. *Guess*.
 pub(crate) const LEAVES: f64 = 0.7;
-/// Turns that leave less than this share more than the best are as likely. *Guess*.
-pub(crate) const AS_LIKELY: f64 = 1.05;
-
-/// Whole turns of the motor between the generator zero of the rows and that of the table.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TurnsOff {
-    /// The generator angle of the rows reads n turns more than that of the table.
-    pub turns: i64,
-    /// The fewest and the most turns that leave about as little.
-    pub likely: [i64; 2],
-    /// What the table leaves of the rows about their mean with these turns taken off, arcsec rms; of a sample of them.
-    pub rms_residual_arcsec: f64,
-}
-
-impl TurnsOff {
-    /// A reason, and what to do.
-    #[must_use]
-    pub fn text(&self) -> String {
-        let Self { turns, likely: [fewest, most], rms_residual_arcsec: left } = self;
-        let ahead = if *turns > 0 { "more" } else { "less" };
-        let likely =
-            if fewest == most { String::new() } else { format!(" ({fewest} to {most} leave about as little)") };
-        let off = format!("{}{}", if *turns > 0 { "-" } else { "+" }, turns.abs());
-        format!(
-            "the motor's zero is off by whole turns: the generator angle reads {} turns {ahead} than that of the \
-             table{likely}; without these turns the residual is {left:.1} arcsec rms. Home the motor in the turn of \
-             the table, or take them off: --columns generator=NAME:turn{off} (in its unit; in rad {:+.6})",
-            turns.abs(),
-            -std::f64::consts::TAU * *turns as f64
-        )
-    }
-}
 
 /// A sample of the rows with what the table leaves of them.
 pub(crate) struct Misfit<'a> {
@@ -66,7 +27,7 @@ pub(crate) struct Misfit<'a> {
 impl<'a> Misfit<'a> {
     pub(crate) fn of(table: &'a Table<'a>, rows: &'a [MeasuredRow]) -> Misfit<'a> {
         let rows: Vec<&MeasuredRow> = rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect();
-        let residual = residual(table, &rows, 0.0, 1.0);
+        let residual = residual(table, &rows, 1.0);
         let measured: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
         let most_left = LEAVES * about_mean(&residual).min(about_mean(&measured));
         Misfit { table, rows, residual, most_left }
@@ -78,7 +39,7 @@ impl<'a> Misfit<'a> {
 
     /// What the table leaves with the torque's sign turned, arcsec rms.
     pub(crate) fn torque_turned(&self) -> Option<f64> {
-        self.clear(about_mean(&residual(self.table, &self.rows, 0.0, -1.0)))
+        self.clear(about_mean(&residual(self.table, &self.rows, -1.0)))
     }
 
     /// What another spring and another first wave of the output would leave of the residual, arcsec rms, where the load
@@ -93,25 +54,11 @@ impl<'a> Misfit<'a> {
         let span = FreeSpan::default().beyond(waves.into_iter().chain([torque]));
         self.clear(about_mean(&span.freed(self.residual.clone()))).filter(|_| goes_with_angle)
     }
-
-    /// The turn at which the table leaves least; `None` if that is the one in which the rows stand, or is not clear.
-    pub(crate) fn turns_off(&self) -> Option<TurnsOff> {
-        let left =
-            |turns: i64| about_mean(&residual(self.table, &self.rows, std::f64::consts::TAU * turns as f64, 1.0));
-        // A turn of the output later the table is the same.
-        let half = (0.5 * self.table.drive().exact_ratio().abs()).ceil() as i64;
-        let all: Vec<(i64, f64)> = (-half..=half).map(|turns| (turns, left(turns))).collect();
-        let (best, least) = all.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.abs().cmp(&b.0.abs())))?;
-        self.clear(least).filter(|_| best != 0)?;
-        let likely = |turns: &i64| all.iter().any(|(other, left)| other == turns && *left <= AS_LIKELY * least);
-        let run = |by: i64| (1..).map(|k| best + by * k).take_while(likely).last().unwrap_or(best);
-        Some(TurnsOff { turns: best, likely: [run(-1), run(1)], rms_residual_arcsec: least })
-    }
 }
 
-/// What the table leaves of rows, arcsec, with the generator's zero and the torque's sign changed.
-fn residual(table: &Table<'_>, rows: &[&MeasuredRow], off_rad: f64, sign: f64) -> Vec<f64> {
-    let states = rows.iter().map(|row| [row.generator_rad - off_rad, sign * row.torque_n_m, row.temperature_c]);
+/// What the table leaves of rows, arcsec, with this sign of the torque.
+fn residual(table: &Table<'_>, rows: &[&MeasuredRow], sign: f64) -> Vec<f64> {
+    let states = rows.iter().map(|row| [row.generator_rad, sign * row.torque_n_m, row.temperature_c]);
     let residual = |(row, said): (&&MeasuredRow, Prediction)| {
         row.error_arcsec - f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD
     };

@@ -15,7 +15,7 @@ use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, quantile_of, white_noise,
 };
-use crate::misfit::{Misfit, TurnsOff, about_mean};
+use crate::misfit::{Misfit, about_mean};
 use crate::nominal::Nominal;
 use crate::wind_up::along;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -85,8 +85,6 @@ pub struct ReplaySummary {
     pub mean_residual_arcsec: f64,
     /// Rows by quality: in range, uncertain, extrapolated, disabled.
     pub rows_by_quality: [usize; 4],
-    /// Whole turns of the motor by which the generator zero of the rows is off the table's, where the rows show that.
-    pub generator_zero_off: Option<TurnsOff>,
     /// Residual of the table with the torque's sign turned, arcsec rms, where the rows show that it is.
     pub torque_turned_rms_arcsec: Option<f64>,
     /// Residual of the table with another spring and another wave of the output, arcsec rms, where the load goes with
@@ -172,8 +170,7 @@ impl ReplaySummary {
     /// Remarks where the table gains less than it could, or nothing: each explanation that the rows allow.
     fn of_gain(&self) -> Vec<String> {
         let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
-        let mut why = Vec::new();
-        why.extend(self.other_load_rms_arcsec.map(|without| {
+        let mut why = Vec::from_iter(self.other_load_rms_arcsec.map(|without| {
             format!(
                 "the load follows the angle of the output here, and another stiffness and output wave would reduce the \
                  residual to {without:.1} arcsec rms: the rows may be of another posture or payload than those of \
@@ -186,7 +183,6 @@ impl ReplaySummary {
                  what turns the output forward: --columns torque=NAME:-N.m"
             )
         }));
-        why.extend(self.generator_zero_off.as_ref().map(TurnsOff::text));
         let is_of_unit = "is it the table of this unit, with the generator zero of these rows?";
         let nothing = left > measured;
         let begin = if nothing {
@@ -199,7 +195,7 @@ impl ReplaySummary {
         };
         match why.as_slice() {
             [] if nothing => {
-                vec![format!("{begin}; neither whole turns of the motor nor the torque explain that; {is_of_unit}")]
+                vec![format!("{begin}; no sign of the torque explains that; {is_of_unit}")]
             }
             [] => Vec::new(),
             [one] => vec![format!("{begin}; {one}")],
@@ -354,7 +350,6 @@ pub fn replay(
         max_residual_arcsec: off.iter().copied().fold(0.0, f64::max),
         mean_residual_arcsec,
         rows_by_quality: by_quality,
-        generator_zero_off: found.turns_off(),
         torque_turned_rms_arcsec: found.torque_turned(),
         other_load_rms_arcsec: found.other_load(),
         rows_of: None,

@@ -15,7 +15,6 @@ use super::parts::State;
 use super::rows::Rows;
 use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::median_of;
-use crate::misfit::AS_LIKELY;
 use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -62,6 +61,8 @@ pub struct Alignment {
     pub why: String,
 }
 
+/// Turns that leave less than this share more than the best are as likely. *Guess*.
+const AS_LIKELY: f64 = 1.05;
 /// An output reads absolutely if it says the zero of the generator to this much of it, rad. *Guess*: play and wind-up
 /// move it by less, and a zero set at will comes so close once in some dozen.
 const ABSOLUTE_RAD: f64 = 180.0 / ARCSEC_PER_RAD;
