@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! e = e₋(T) − (h − p), T > 0;  e₊(T) + (h + p), T ≤ 0;  within e₊(T) to e₋(T), and in addition
-//! H(T) = g₀·T + Σ gᵢ·clamp(zᵢ + T₁ − T₀, −wᵢ, wᵢ)       zᵢ: what the springs held under the load T₀ before
+//! H(T) = Σ gₖ·Tᵏ + Σ gᵢ·clamp(zᵢ + T₁ − T₀, −wᵢ, wᵢ)       zᵢ: what the springs held under the load T₀ before
 //! ```
 //! `e₊`, `e₋` are the errors of the table moving forward and backward, `h` is half of their distance without load, `p`
 //! from −h to h where the output rests inside its play: it follows the generator by the play operator of the core, and
@@ -56,8 +56,9 @@ const NEWEST: f64 = 0.2;
 /// Prandtl-Ishlinskii), in addition to what a table has.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hysteresis {
-    /// In proportion to the load, rad/(N·m): the wind-up of a table is the middle of loops, with springs in them.
-    pub gain_rad_per_n_m: f64,
+    /// By the load and its powers, rad/(N·m)ᵏ: the wind-up of a table is the middle of loops, with springs in them, and
+    /// bends where loops end.
+    pub by_load: Vec<f64>,
     /// The springs.
     pub springs: Vec<SlipSpring>,
 }
@@ -66,7 +67,8 @@ impl Hysteresis {
     /// Error under a load that comes after others, rad.
     pub(crate) fn error_rad(&self, held: &HeldTorques, torque_n_m: f64) -> f64 {
         let springs = self.springs.iter().enumerate();
-        springs.fold(self.gain_rad_per_n_m * torque_n_m, |sum, (k, spring)| {
+        let by_load = self.by_load.iter().rev().fold(0.0, |sum, gain| (sum + gain) * torque_n_m);
+        springs.fold(by_load, |sum, (k, spring)| {
             sum + spring.gain_rad_per_n_m * held.under(torque_n_m, k, spring.width_n_m)
         })
     }
@@ -139,14 +141,9 @@ impl<'t> WindUpCurve<'t> {
         [torque, low, high]
     }
 
-    /// Half width that an interval needs to hold the torque recorded, rad.
-    pub(crate) fn needs(&mut self, row: &MeasuredRow, error_rad: f64, half_width_rad: f64) -> f64 {
-        self.next([row.generator_rad, error_rad, row.temperature_c, half_width_rad, row.torque_n_m])[3]
-    }
-
-    /// Both of the next row.
-    fn next(&mut self, [generator_rad, error_rad, temperature_c, half_width_rad, known_n_m]: [f64; 5]) -> [f64; 4] {
-        let Some(generator) = GeneratorAngle::from_rad(generator_rad) else { return [f64::NAN; 4] };
+    /// The same of a row, with the half width that its interval needs to hold the torque recorded, rad.
+    pub(crate) fn next(&mut self, [psi_rad, error_rad, temperature_c, half_rad, known_n_m]: [f64; 5]) -> [f64; 4] {
+        let Some(generator) = GeneratorAngle::from_rad(psi_rad) else { return [f64::NAN; 4] };
         let steady = |torque_n_m: f64| {
             [Direction::Forward, Direction::Backward].map(|way| {
                 let error = self.table.steady_error_rad(generator, torque_n_m as f32, temperature_c as f32, way);
@@ -155,7 +152,7 @@ impl<'t> WindUpCurve<'t> {
         };
         let range @ [least_n_m, most_n_m] = self.table.torque_range_n_m().map(f64::from);
         let per_n_m = (steady(most_n_m)[0] - steady(least_n_m)[0]) / (most_n_m - least_n_m);
-        self.held.half_width_n_m = half_width_rad / per_n_m;
+        self.held.half_width_n_m = half_rad / per_n_m;
         let before = self.held.torque_n_m;
         let [half, left] = [0.0, before].map(steady).map(|[forward, backward]| 0.5 * (backward - forward));
         let _ = self.table.forward(&mut self.play, generator, before as f32, temperature_c as f32);
@@ -169,7 +166,7 @@ impl<'t> WindUpCurve<'t> {
             at.max(forward).min(backward) + self.hysteresis.error_rad(&self.held, torque)
         };
         let [torque, low, high] =
-            [0.0, -1.0, 1.0].map(|end| load_of(|load| error_at(load, -end), range, error_rad + end * half_width_rad));
+            [0.0, -1.0, 1.0].map(|end| load_of(|load| error_at(load, -end), range, error_rad + end * half_rad));
         let [below, above] = [1.0, -1.0].map(|end| end * (error_rad - error_at(known_n_m, end)));
         let needs = below.max(above).max(0.0).min((torque - known_n_m).abs() * per_n_m);
         if !(torque + half + left + error_rad).is_finite() {
@@ -238,7 +235,7 @@ mod tests {
     fn a_load_comes_back_along_its_loop() {
         const STIFF: f64 = 3e-5;
         let spring = SlipSpring { width_n_m: 4.0, gain_rad_per_n_m: -8e-6 };
-        let with = Hysteresis { gain_rad_per_n_m: 1e-6, springs: vec![spring] };
+        let with = Hysteresis { by_load: vec![1e-6, 2e-8], springs: vec![spring] };
         let step: f64 = 0.01;
         let path = [30.0, -30.0, 12.0, 2.0].windows(2).flat_map(|ends| {
             let steps = ((ends[1] - ends[0]) / step).abs();
@@ -249,13 +246,14 @@ mod tests {
         for torque in path {
             z = f64::clamp(z + torque - before, -4.0, 4.0);
             before = torque;
-            let read = (STIFF + 1e-6) * torque - 8e-6 * z;
+            let read = STIFF * torque + 1e-6 * torque + 2e-8 * torque * torque - 8e-6 * z;
             let found = load_of(|load| STIFF * load + with.error_rad(&held, load), [-40.0, 40.0], read);
             held.follow(found, [spring.width_n_m]);
             assert!((found - torque).abs() < 1e-3, "{torque}: {found}");
             if z.abs() == 4.0 {
-                let without = load_of(|load| STIFF * load + 1e-6 * load, [-40.0, 40.0], read);
-                assert!((without - torque + z * 8e-6 / (STIFF + 1e-6)).abs() < 1e-3, "{torque}: {without}");
+                let by_load = |load: f64| STIFF * load + 1e-6 * load + 2e-8 * load * load;
+                let without = load_of(by_load, [-40.0, 40.0], read);
+                assert!((by_load(without) - by_load(torque) + z * 8e-6).abs() < 1e-8, "{torque}: {without}");
             }
         }
     }

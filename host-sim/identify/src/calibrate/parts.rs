@@ -81,7 +81,7 @@ pub(super) const TOOTH_ORDERS: u16 = 3;
 /// Parts of the output's turn, each with rows or without. *Guess*: six to the period of the highest wave.
 pub(super) const PARTS_OF_A_TURN: usize = 36;
 /// Degree of the wind-up over the torques recorded.
-const WIND_UP_DEGREE: usize = 6;
+pub(super) const WIND_UP_DEGREE: usize = 6;
 /// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come
 /// into contact. A polynomial has no such bend, and swings between the loads recorded instead. A guess, between the
 /// dead zone and the first loads of a plan.
@@ -134,7 +134,7 @@ pub struct Scales {
 }
 
 impl Scales {
-    fn most_torque(&self) -> f64 {
+    pub(super) fn most_torque(&self) -> f64 {
         self.torque_n_m[0].abs().max(self.torque_n_m[1].abs()).max(1e-9)
     }
 

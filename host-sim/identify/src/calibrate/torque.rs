@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::folds::Folds;
-use super::parts::State;
+use super::parts::{State, WIND_UP_DEGREE};
 use super::prior::Prior;
 use super::rows::Rows;
 use super::{LEAST_GAIN, Model, ROUNDING_ARCSEC};
@@ -24,10 +24,11 @@ use flexspline_design::tables::SlipSpring;
 
 /// Share of the rows whose interval is to hold their torque, by definition.
 pub(crate) const INSIDE: f64 = 0.95;
-/// Torques at which springs slip, of the largest recorded: each twice the one before, up to half, as a loop of a spring
-/// that slips later is not closed. *Guess*.
-const SLIPS: [f64; 5] = [1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
-/// Zero of a session, and way of a spring per N·m, before rows say anything, arcsec: far beyond any. *Guess*.
+/// Torques at which springs slip, of the largest recorded: from half of it, as a loop of a spring that slips later is
+/// not closed, each half of the one before. *Guess*.
+const SLIPS: [f64; 5] = [0.5, 0.25, 0.125, 1.0 / 16.0, 1.0 / 32.0];
+/// Zero of a session, way of a spring per N·m, and bend of the wind-up, before rows say anything, arcsec: far beyond
+/// any. *Guess*.
 const ANY_ARCSEC: f64 = 1e4;
 /// Weight of a row left out: a session that has no others takes its zero from them. *Guess*.
 const LEFT_OUT: f64 = 1e-6;
@@ -57,45 +58,43 @@ pub struct WindUpTorque {
 /// Springs.
 const SPRINGS: usize = SLIPS.len();
 
-/// A number for each spring.
-type Held = [f64; SPRINGS];
-
 /// A fit to all folds but one: zeros of the sessions, arcsec, the model, and what it does not have.
 type FitWithout<'m> = (Vec<f64>, &'m Model, Hysteresis);
 
-/// What the springs hold in each row by the torque recorded, N·m.
-fn held_by(loads: &[(usize, f64)], widths_n_m: Held) -> Vec<Held> {
-    let mut held = HeldTorques::default();
-    let of_row = |(session, torque_n_m): &(usize, f64)| {
-        held.begin(*session);
-        held.follow(*torque_n_m, widths_n_m);
-        std::array::from_fn(|k| held.by_spring[k])
-    };
-    loads.iter().map(of_row).collect()
+/// Torques at which the springs slip, N·m.
+fn widths_of(model: &Model) -> [f64; SPRINGS] {
+    SLIPS.map(|share| share * model.scales.most_torque())
 }
 
-/// Products of the sessions, of what the springs hold, and of the load with what a model leaves of some rows, all but
-/// those of a fold.
-fn sums(rows: &Rows, held: &[Held], fold: Option<usize>, model: &Model) -> Gram {
+/// Products of the sessions, of what the springs hold, and of powers of the load with what a model leaves of some rows,
+/// all but those of a fold.
+fn sums(rows: &Rows, fold: Option<usize>, model: &Model) -> Gram {
     let sessions = rows.loads.last().map_or(0, |(session, _)| session + 1);
-    let mut gram = Gram::none(sessions + SPRINGS + 2);
+    let mut gram = Gram::none(sessions + SPRINGS + WIND_UP_DEGREE + 1);
     let mut x = vec![0.0; gram.size];
-    for row in &rows.rows {
+    let (mut held, mut settled) = (HeldTorques::default(), rows.rows.iter().peekable());
+    for (number, (session, torque_n_m)) in rows.loads.iter().enumerate() {
+        held.begin(*session);
+        held.follow(*torque_n_m, widths_of(model));
+        let Some(row) = settled.next_if(|row| row.number == number) else { continue };
         x[..sessions].fill(0.0);
-        x[rows.loads[row.number].0] = 1.0;
-        x[sessions..][..SPRINGS].copy_from_slice(&held[row.number]);
-        x[sessions + SPRINGS..].copy_from_slice(&[row.at.torque_n_m, row.left_arcsec - model.adds_arcsec(&row.at)]);
+        x[*session] = 1.0;
+        x[sessions..][..SPRINGS].copy_from_slice(&held.by_spring);
+        let load = row.at.torque_n_m / model.scales.most_torque();
+        (1..).zip(&mut x[sessions + SPRINGS..]).for_each(|(power, x)| *x = load.powi(power));
+        x[gram.size - 1] = row.left_arcsec - model.adds_arcsec(&row.at);
         gram.add_row(&x, if Some(row.fold) == fold { LEFT_OUT } else { 1.0 });
     }
     gram.among(&(0..gram.size).collect::<Vec<usize>>())
 }
 
-/// Zeros of the sessions and hysteresis by such products: by so many of the springs, those that slip last, of which the
-/// last never does. The output lags: a spring with which it would lead gets nothing.
-fn hysteresis_in((gram, model): &(Gram, Model), widths_n_m: Held, springs: usize) -> Option<FitWithout<'_>> {
-    let sessions = gram.size - SPRINGS - 2;
+/// Zeros of the sessions and hysteresis by such products: by so many of the springs, those that slip last, and so many
+/// powers of the load. The output lags: a spring with which it would lead gets nothing.
+fn hysteresis_in((gram, model): &(Gram, Model), [springs, powers]: [usize; 2]) -> Option<FitWithout<'_>> {
+    let sessions = gram.size - SPRINGS - WIND_UP_DEGREE - 1;
     let mut priors = vec![linear::Prior { mean: 0.0, std: ANY_ARCSEC }; gram.size - 1];
-    priors[sessions..][..SPRINGS + 1 - springs].iter_mut().for_each(|prior| prior.std = 0.0);
+    let (held, by_load) = priors[sessions..].split_at_mut(SPRINGS);
+    held[springs..].iter_mut().chain(&mut by_load[powers..]).for_each(|prior| prior.std = 0.0);
     loop {
         let mut zeros = solve(gram, &priors, 1.0)?.coefficients;
         let leads = (sessions..sessions + SPRINGS).filter(|k| priors[*k].std > 0.0 && zeros[*k] > 0.0);
@@ -103,10 +102,12 @@ fn hysteresis_in((gram, model): &(Gram, Model), widths_n_m: Held, springs: usize
             priors[most].std = 0.0;
             continue;
         }
+        let most_n_m = model.scales.most_torque();
         let gains: Vec<f64> = zeros.split_off(sessions).iter().map(|arcsec| arcsec / ARCSEC_PER_RAD).collect();
-        let springs = widths_n_m.into_iter().zip(&gains);
+        let springs = widths_of(model).into_iter().zip(&gains);
         let springs = springs.map(|(width_n_m, gain)| SlipSpring { width_n_m, gain_rad_per_n_m: gain.min(0.0) });
-        let hysteresis = Hysteresis { springs: springs.collect(), gain_rad_per_n_m: gains[SPRINGS] };
+        let by_load = (1..).zip(&gains[SPRINGS..]).map(|(power, gain)| gain / most_n_m.powi(power));
+        let hysteresis = Hysteresis { springs: springs.collect(), by_load: by_load.collect() };
         return Some((zeros, model, hysteresis));
     }
 }
@@ -129,32 +130,30 @@ impl WindUpTorque {
             return None;
         }
         let all = folds.all();
-        let widths_n_m = SLIPS.map(|share| share * low.abs().max(high.abs()));
-        let held = held_by(&rows.loads, widths_n_m);
         let without = |fold: Option<usize>| {
             let others: Vec<usize> = all.iter().copied().filter(|other| Some(*other) != fold).collect();
             let mut zeros = folds.fit(&others, &model.chosen, &[])?;
             let coefficients = zeros.split_off(zeros.len() - model.coefficients.len());
             let model = Model { coefficients, ..model.clone() };
-            Some((sums(rows, &held, fold, &model), model))
+            Some((sums(rows, fold, &model), model))
         };
         let models = (0..=*all.last()?).map(|fold| without(Some(fold))).collect::<Option<Vec<_>>>()?;
-        let judged = |springs: usize, half_width_arcsec: f64| {
-            let fits = models.iter().map(|of| hysteresis_in(of, widths_n_m, springs)).collect::<Option<Vec<_>>>()?;
-            Some((springs, Self::judged(rows, &fits, half_width_arcsec / per_n_m, prior)))
+        let judged = |by: [usize; 2], half_width_arcsec: f64| {
+            let fits = models.iter().map(|of| hysteresis_in(of, by)).collect::<Option<Vec<_>>>()?;
+            Some((by, Self::judged(rows, &fits, half_width_arcsec / per_n_m, prior)))
         };
-        let (_, alone) = judged(0, 0.0)?;
-        let tried = (1..=SPRINGS + 1).into_par_iter();
-        let tried = tried.filter_map(|springs| judged(springs, alone.half_width_arcsec));
-        let (springs, best) = tried.min_by(|(_, a), (_, b)| a.rms_n_m.total_cmp(&b.rms_n_m))?;
-        let (_, best) = judged(springs, best.half_width_arcsec)?;
+        let (_, alone) = judged([0, 0], 0.0)?;
+        let tried = (0..=SPRINGS).into_par_iter();
+        let tried = tried.flat_map_iter(|springs| [1, WIND_UP_DEGREE].map(|powers| [springs, powers]));
+        let tried = tried.filter_map(|by| judged(by, alone.half_width_arcsec));
+        let (by, best) = tried.min_by(|(_, a), (_, b)| a.rms_n_m.total_cmp(&b.rms_n_m))?;
+        let (_, best) = judged(by, best.half_width_arcsec)?;
         if best.rms_n_m.powi(2) >= (1.0 - LEAST_GAIN) * alone.rms_n_m.powi(2) {
             return Some(alone);
         }
         let of_all = without(None)?;
-        let (.., mut hysteresis) = hysteresis_in(&of_all, widths_n_m, springs)?;
-        let holds_arcsec = |of: &SlipSpring| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD;
-        hysteresis.springs.retain(|spring| holds_arcsec(spring) > ROUNDING_ARCSEC);
+        let (.., mut hysteresis) = hysteresis_in(&of_all, by)?;
+        hysteresis.springs.retain(|of| -of.gain_rad_per_n_m * of.width_n_m * ARCSEC_PER_RAD > ROUNDING_ARCSEC);
         Some(Self { hysteresis: Some(hysteresis), half_width_alone_arcsec: alone.half_width_arcsec, ..best })
     }
 
@@ -164,7 +163,9 @@ impl WindUpTorque {
         let rows: Vec<_> = measured_rows(files.iter().flat_map(|file| &file.sessions), temperature_c).collect();
         let of_all = |hysteresis: &Hysteresis, half_arcsec: f64| {
             let half_rad = half_arcsec / ARCSEC_PER_RAD;
-            let mut needs = along(table, &rows, hysteresis, |curve, row, error| curve.needs(row, error, half_rad));
+            let mut needs = along(table, &rows, hysteresis, |curve, row, error| {
+                curve.next([row.generator_rad, error, row.temperature_c, half_rad, row.torque_n_m])[3]
+            });
             half_arcsec.max(quantile_of(&mut needs, INSIDE) * ARCSEC_PER_RAD)
         };
         let half_width_alone_arcsec = of_all(&Hysteresis::default(), self.half_width_alone_arcsec);
