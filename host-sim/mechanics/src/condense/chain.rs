@@ -6,7 +6,9 @@
 //! unknowns the matrix is quasi-definite: their blocks are negative definite, those of the faces positive, and any
 //! order serves (Vanderbei 1995).
 
-use super::dense::DenseKernels;
+use pulp::{Simd, WithSimd};
+
+use super::dense::{DenseKernels, kernel, one_mut, subtract_sides};
 
 /// A block of unknowns.
 #[derive(Debug, Clone, Copy)]
@@ -26,6 +28,8 @@ pub struct Contribution {
     pub blocks: Vec<u32>,
     /// Symmetric matrix, column-major; only the lower triangle is read.
     pub matrix: Vec<f64>,
+    /// Rows and columns of it that come before those of the blocks.
+    pub before: usize,
 }
 
 /// An eliminated block.
@@ -51,8 +55,7 @@ pub struct Chain {
     /// First unknown of each block in a right-hand side.
     offsets: Vec<usize>,
     unknowns: usize,
-    /// Work space: the front, and matrices that have been used up.
-    front: Vec<f64>,
+    /// Work space: fronts that have been used up.
     spare: Vec<Vec<f64>>,
 }
 
@@ -98,28 +101,25 @@ impl Chain {
                 offset[*b as usize] = m;
                 m += blocks[*b as usize].size;
             }
-            self.front.clear();
-            self.front.resize(m * m, 0.0);
+            let mut front = self.spare.pop().unwrap_or_default();
+            front.clear();
+            front.resize(m * m, 0.0);
             for source in sources {
-                add_block_matrix(&mut self.front, m, source, blocks, &offset);
+                self.kernels.0.dispatch(AddBlocks { front: &mut front, m, source, blocks, offset: &offset });
             }
             let ChainBlock { size, sign, .. } = blocks[block as usize];
-            if !self.kernels.eliminate(&mut self.front, m, size, sign) {
+            if !self.kernels.eliminate(&mut front, m, size, sign) {
                 return false;
             }
             let start = self.values.len();
-            self.values.extend_from_slice(&self.front[..m * size]);
+            self.values.extend_from_slice(&front[..m * size]);
             let later = members.split_off(1);
             for u in std::mem::take(&mut updates_at[block as usize]) {
                 self.spare.push(std::mem::take(&mut updates[u as usize].matrix));
             }
             if let Some(&next) = later.first() {
-                let mut matrix = self.spare.pop().unwrap_or_default();
-                matrix.clear();
-                let left = self.front.chunks_exact(m).skip(size);
-                left.for_each(|column| matrix.extend_from_slice(&column[size..]));
                 updates_at[next as usize].push(updates.len() as u32);
-                updates.push(Contribution { blocks: later.clone(), matrix });
+                updates.push(Contribution { blocks: later.clone(), matrix: front, before: size });
             }
             self.panels.push(Panel { block, size, sign, order: m, later, start });
         }
@@ -165,38 +165,33 @@ impl Chain {
     }
 }
 
-/// Adds the lower triangle of a contribution to that of a front.
-fn add_block_matrix(front: &mut [f64], m: usize, source: &Contribution, blocks: &[ChainBlock], offset: &[usize]) {
-    let n: usize = source.blocks.iter().map(|b| blocks[*b as usize].size).sum();
-    let mut column = 0;
+// Adds the lower triangle of a matrix over blocks to that of a front.
+kernel!(AddBlocks {
+    front: &'a mut [f64], m: usize, source: &'a Contribution, blocks: &'a [ChainBlock], offset: &'a [usize]
+} -> (), |_simd| {
+    let stride = source.before + source.blocks.iter().map(|b| blocks[*b as usize].size).sum::<usize>();
+    let mut column = source.before;
     for (jb, &b) in source.blocks.iter().enumerate() {
-        let to = offset[b as usize];
-        for j in 0..blocks[b as usize].size {
-            let mut row = column;
-            let diagonal = &source.matrix[row + j + (column + j) * n..];
-            let size = blocks[b as usize].size;
-            for (k, x) in diagonal[..size - j].iter().enumerate() {
-                front[to + j + k + (to + j) * m] += x;
-            }
-            row += size;
+        let (to, size) = (offset[b as usize], blocks[b as usize].size);
+        for j in 0..size {
+            let values = &source.matrix[(column + j) * stride..];
+            let own = &mut front[(to + j) * (m + 1)..][..size - j];
+            subtract_sides(one_mut(own), &values[column + j..][..size - j], [-1.0]);
+            let mut row = column + size;
             for &a in &source.blocks[jb + 1..] {
                 let (from, size) = (offset[a as usize], blocks[a as usize].size);
-                let values = &source.matrix[row + (column + j) * n..][..size];
+                let values = &values[row..row + size];
                 if from > to {
-                    for (f, x) in front[from + (to + j) * m..][..size].iter_mut().zip(values) {
-                        *f += x;
-                    }
+                    subtract_sides(one_mut(&mut front[from + (to + j) * m..][..size]), values, [-1.0]);
                 } else {
-                    for (i, x) in values.iter().enumerate() {
-                        front[to + j + (from + i) * m] += x;
-                    }
+                    values.iter().enumerate().for_each(|(i, x)| front[to + j + (from + i) * m] += x);
                 }
                 row += size;
             }
         }
-        column += blocks[b as usize].size;
+        column += size;
     }
-}
+});
 
 #[cfg(test)]
 mod tests {
@@ -232,7 +227,7 @@ mod tests {
                         matrix[i + j * n] = if i == j { 9.0 * signs[i] } else { rng.f64() - 0.5 };
                     }
                 }
-                Contribution { blocks: members, matrix }
+                Contribution { blocks: members, matrix, before: 0 }
             })
             .collect();
         let mut chain = Chain::default();

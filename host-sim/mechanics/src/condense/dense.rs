@@ -3,11 +3,11 @@
 //! At this size the calls of a general library cost as much as the arithmetic; these loops are compiled for the vector
 //! unit that the machine has (pulp).
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Kernels compiled for this machine.
 #[derive(Debug, Clone, Copy)]
-pub struct DenseKernels(Arch);
+pub struct DenseKernels(pub(super) Arch);
 
 impl Default for DenseKernels {
     fn default() -> Self {
@@ -92,40 +92,86 @@ pub fn one_mut(x: &mut [f64]) -> &mut [[f64; 1]] {
 
 /// A kernel as a value: the calls of a closure are not always inlined, and then not compiled for the vector unit.
 macro_rules! kernel {
-    ($name:ident $(<$sides:ident>)? { $($field:ident: $type:ty),* } -> $output:ty, $body:block) => {
+    ($name:ident $(<$sides:ident>)? { $($field:ident: $type:ty),* } -> $output:ty, |$simd:ident| $body:expr) => {
         struct $name<'a $(, const $sides: usize)?> {
             $($field: $type),*
         }
 
-        impl<$(const $sides: usize)?> NullaryFnOnce for $name<'_ $(, $sides)?> {
+        impl<$(const $sides: usize)?> WithSimd for $name<'_ $(, $sides)?> {
             type Output = $output;
 
             #[inline(always)]
-            fn call(self) -> $output {
+            fn with_simd<S: Simd>(self, $simd: S) -> $output {
                 let $name { $($field),* } = self;
                 $body
             }
         }
     };
 }
+pub(super) use kernel;
 
-kernel!(Eliminate { front: &'a mut [f64], m: usize, p: usize, sign: f64 } -> bool, { eliminate(front, m, p, sign) });
+kernel!(Eliminate { front: &'a mut [f64], m: usize, p: usize, sign: f64 } -> bool, |simd| {
+    if sign < 0.0 {
+        for k in 0..p {
+            front[k * m + k..k * m + p].iter_mut().for_each(|x| *x = -*x);
+        }
+    }
+    // Rows from j on in whole vectors, which begin above the diagonal where need be: what lies there is never read.
+    let above = |j: usize| m.checked_sub((m - j).next_multiple_of(8)).unwrap_or(j);
+    let mut k = 0;
+    while k < p {
+        let width = (p - k).min(4);
+        for c in k..k + width {
+            let (before, column) = front.split_at_mut(c * m);
+            for b in k..c {
+                let other = &before[b * m..(b + 1) * m];
+                subtract_sides(one_mut(&mut column[above(c)..m]), &other[above(c)..], [other[c]]);
+            }
+            let pivot = column[c];
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return false;
+            }
+            let scale = 1.0 / pivot.sqrt();
+            column[above(c)..m].iter_mut().for_each(|x| *x *= scale);
+        }
+        for j in k + width..m {
+            let s = if j < p { 1.0 } else { sign };
+            let (before, after) = front.split_at_mut(j * m);
+            let from = above(j);
+            let source = |i: usize| &before[(k + i) * m..(k + i + 1) * m];
+            let column = one_mut(&mut after[from..m]);
+            if width == 4 {
+                let sources = [0, 1, 2, 3].map(source);
+                subtract_four(simd, column, sources.map(|a| &a[from..]), sources.map(|a| [s * a[j]]));
+            } else {
+                (0..width).map(source).for_each(|a| subtract_sides(column, &a[from..], [s * a[j]]));
+            }
+        }
+        k += width;
+    }
+    true
+});
 
 kernel!(Forward<W> {
     panel: &'a [f64], m: usize, p: usize, sign: f64, x: &'a mut [[f64; W]], rest: &'a mut [[f64; W]]
-} -> (), {
-    for k in 0..p {
-        let column = &panel[k * m..(k + 1) * m];
-        let y = x[k].map(|x| x / column[k]);
-        x[k] = y;
-        subtract_sides(&mut x[k + 1..], &column[k + 1..p], y);
-        subtract_sides(rest, &column[p..], y.map(|y| sign * y));
+} -> (), |simd| {
+    for k in (0..p).step_by(4) {
+        let end = (k + 4).min(p);
+        for c in k..end {
+            let column = &panel[c * m..(c + 1) * m];
+            x[c] = x[c].map(|x| x / column[c]);
+            let y = x[c];
+            subtract_sides(&mut x[c + 1..end], &column[c + 1..end], y);
+        }
+        let (solved, later) = x.split_at_mut(end);
+        subtract_columns(simd, later, &panel[k * m..end * m], m, end, &solved[k..], 1.0);
+        subtract_columns(simd, rest, &panel[k * m..end * m], m, p, &solved[k..], sign);
     }
 });
 
 kernel!(Backward<W> {
     panel: &'a [f64], m: usize, p: usize, sign: f64, x: &'a mut [[f64; W]], rest: &'a [[f64; W]]
-} -> (), {
+} -> (), |_simd| {
     for k in (0..p).rev() {
         let column = &panel[k * m..(k + 1) * m];
         let known = dot_sides(&column[p..], rest);
@@ -137,13 +183,12 @@ kernel!(Backward<W> {
     }
 });
 
-kernel!(Multiply<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &'a mut [[f64; W]] } -> (), {
-    for (column, x) in a.chunks_exact(y.len().max(1)).zip(x) {
-        subtract_sides(y, column, x.map(|x| -sign * x));
-    }
+kernel!(Multiply<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &'a mut [[f64; W]] } -> (), |simd| {
+    let m = y.len();
+    subtract_columns(simd, y, a, m, 0, x, -sign);
 });
 
-kernel!(MultiplyTransposed<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &'a mut [[f64; W]] } -> (), {
+kernel!(MultiplyTransposed<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &'a mut [[f64; W]] } -> (), |_simd| {
     for (column, y) in a.chunks_exact(x.len().max(1)).zip(y) {
         let product = dot_sides(column, x);
         for w in 0..W {
@@ -152,15 +197,52 @@ kernel!(MultiplyTransposed<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &
     }
 });
 
+/// `y -= sign A x` for the rows of a column-major matrix (m rows) from `first` on, four columns at a time: what is
+/// read and written of y serves them all.
 #[inline(always)]
-fn subtract(y: &mut [f64], x: &[f64], factor: f64) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y = x.mul_add(-factor, *y);
+fn subtract_columns<S: Simd, const W: usize>(
+    simd: S,
+    y: &mut [[f64; W]],
+    a: &[f64],
+    m: usize,
+    first: usize,
+    x: &[[f64; W]],
+    sign: f64,
+) {
+    let rows = y.len();
+    let column = |k: usize| &a[k * m + first..][..rows];
+    let (fours, others) = x.as_chunks::<4>();
+    for (k, x) in fours.iter().enumerate() {
+        let columns = [0, 1, 2, 3].map(|i| column(4 * k + i));
+        subtract_four(simd, y, columns, x.map(|x| x.map(|x| sign * x)));
+    }
+    for (k, x) in others.iter().enumerate() {
+        subtract_sides(y, column(4 * fours.len() + k), x.map(|x| sign * x));
+    }
+}
+
+/// `y -= sum_i factors[i] columns[i]`; of one right-hand side alone as many rows as fill vectors at once.
+#[inline(always)]
+fn subtract_four<S: Simd, const W: usize>(simd: S, y: &mut [[f64; W]], columns: [&[f64]; 4], factors: [[f64; W]; 4]) {
+    let in_vectors = if W == 1 { y.len() - y.len() % S::F64_LANES } else { 0 };
+    let [a, b, c, d] = columns.map(|column| S::as_simd_f64s(&column[..in_vectors]).0);
+    let by = factors.map(|f| simd.splat_f64s(-f[0]));
+    let vectors = S::as_mut_simd_f64s(y[..in_vectors].as_flattened_mut()).0;
+    for ((((y, a), b), c), d) in vectors.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        let sum = simd.mul_add_f64s(*b, by[1], simd.mul_add_f64s(*a, by[0], *y));
+        *y = simd.mul_add_f64s(*d, by[3], simd.mul_add_f64s(*c, by[2], sum));
+    }
+    let [a, b, c, d] = columns.map(|column| &column[in_vectors..]);
+    for ((((y, a), b), c), d) in y[in_vectors..].iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        for w in 0..W {
+            let sum = b.mul_add(-factors[1][w], a.mul_add(-factors[0][w], y[w]));
+            y[w] = d.mul_add(-factors[3][w], c.mul_add(-factors[2][w], sum));
+        }
     }
 }
 
 #[inline(always)]
-fn subtract_sides<const W: usize>(y: &mut [[f64; W]], x: &[f64], factor: [f64; W]) {
+pub(super) fn subtract_sides<const W: usize>(y: &mut [[f64; W]], x: &[f64], factor: [f64; W]) {
     for (y, x) in y.iter_mut().zip(x) {
         for w in 0..W {
             y[w] = x.mul_add(-factor[w], y[w]);
@@ -190,89 +272,6 @@ fn dot_sides<const W: usize>(a: &[f64], b: &[[f64; W]]) -> [f64; W] {
         sum[w] += strands.iter().map(|strand| strand[w]).sum::<f64>();
     }
     sum
-}
-
-#[inline(always)]
-fn eliminate(f: &mut [f64], m: usize, p: usize, sign: f64) -> bool {
-    if sign < 0.0 {
-        for k in 0..p {
-            f[k * m + k..k * m + p].iter_mut().for_each(|x| *x = -*x);
-        }
-    }
-    let mut k = 0;
-    while k < p {
-        let width = (p - k).min(4);
-        for c in k..k + width {
-            let (before, column) = f.split_at_mut(c * m);
-            let column = &mut column[c..m];
-            for b in k..c {
-                let other = &before[b * m + c..(b + 1) * m];
-                subtract(column, other, other[0]);
-            }
-            let pivot = column[0];
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return false;
-            }
-            let scale = 1.0 / pivot.sqrt();
-            column.iter_mut().for_each(|x| *x *= scale);
-        }
-        // The columns behind, four at a time where that is possible; what falls above the diagonal is never read.
-        let mut j = k + width;
-        while j < m {
-            let s = if j < p { 1.0 } else { sign };
-            let (before, after) = f.split_at_mut(j * m);
-            let source = |i: usize| &before[(k + i) * m + j..(k + i + 1) * m];
-            if width == 4 && j + 4 <= m && (j >= p || j + 4 <= p) {
-                let (t0, after) = after.split_at_mut(m);
-                let (t1, after) = after.split_at_mut(m);
-                let (t2, after) = after.split_at_mut(m);
-                let sources = [source(0), source(1), source(2), source(3)];
-                let factors = [0, 1, 2, 3].map(|q| sources.map(|c| -s * c[q]));
-                let [s0, s1, s2, s3] = sources;
-                update(&mut t0[j..], &mut t1[j..], &mut t2[j..], &mut after[j..m], s0, s1, s2, s3, &factors);
-                j += 4;
-            } else {
-                let column = &mut after[j..m];
-                for i in 0..width {
-                    let a = source(i);
-                    subtract(column, a, s * a[0]);
-                }
-                j += 1;
-            }
-        }
-        k += width;
-    }
-    true
-}
-
-/// `t_q += sum_i factors[q][i] s_i`, four columns of four: each value read serves four times.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)] // slices of their own, so that the compiler knows them apart
-fn update(
-    t0: &mut [f64],
-    t1: &mut [f64],
-    t2: &mut [f64],
-    t3: &mut [f64],
-    s0: &[f64],
-    s1: &[f64],
-    s2: &[f64],
-    s3: &[f64],
-    factors: &[[f64; 4]; 4],
-) {
-    let n = t0.len();
-    let (t1, t2, t3) = (&mut t1[..n], &mut t2[..n], &mut t3[..n]);
-    let (s0, s1, s2, s3) = (&s0[..n], &s1[..n], &s2[..n], &s3[..n]);
-    for r in 0..n {
-        let s = [s0[r], s1[r], s2[r], s3[r]];
-        let sum = |q: usize, t: f64| {
-            let f = &factors[q];
-            s[3].mul_add(f[3], s[2].mul_add(f[2], s[1].mul_add(f[1], s[0].mul_add(f[0], t))))
-        };
-        t0[r] = sum(0, t0[r]);
-        t1[r] = sum(1, t1[r]);
-        t2[r] = sum(2, t2[r]);
-        t3[r] = sum(3, t3[r]);
-    }
 }
 
 #[cfg(test)]

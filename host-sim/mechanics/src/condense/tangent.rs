@@ -116,16 +116,16 @@ impl CellAt<'_> {
 }
 
 impl CellTangent {
-    /// Reduces a cell to its contribution; false where it is not stiff. `contact` adds what touches the bore to the
-    /// lower triangle of the matrix of bore and faces (of the given order) and says whether it did.
+    /// Reduces a cell to its contribution, maybe that of its last time; false where it is not stiff. `touched` is
+    /// the matrix of bore and faces with what touches the bore, where anything does, and is used up.
     pub fn reduce(
         &mut self,
         kernels: DenseKernels,
         cell: &Cell,
         (place, tractions): (CellPlacement, Vec<Traction>),
         geometric: Option<Geometric>,
-        contact: impl FnOnce(&mut [f64], usize) -> bool,
-        Contribution { blocks, matrix }: &mut Contribution,
+        touched: Option<&mut [f64]>,
+        Contribution { blocks, matrix, .. }: &mut Contribution,
     ) -> bool {
         let (f, b, i) = (cell.flank(), cell.bore(), 2 * cell.face());
         let r = b + i;
@@ -133,21 +133,29 @@ impl CellTangent {
         self.tractions = tractions;
 
         // Bore and faces.
-        self.panel.clone_from(&cell.body);
-        let touched = contact(&mut self.panel, r);
-        if touched && !kernels.eliminate(&mut self.panel, r, b, 1.0) {
-            return false;
-        }
-        let front = if touched { &self.panel } else { &cell.free_body };
+        self.panel.clear();
+        let front = match touched {
+            Some(front) => {
+                if !kernels.eliminate(front, r, b, 1.0) {
+                    return false;
+                }
+                self.panel.extend_from_slice(&front[..r * b]);
+                front
+            }
+            None => &cell.free_body[..],
+        };
         let columns: Vec<(usize, &[f64])> = self.tractions.iter().flat_map(|t| t.forces()).collect();
         let n = i + columns.len();
-        matrix.clear();
+        if geometric.is_none() && columns.is_empty() && *blocks == place.blocks {
+            // A cell that neither turns nor bears anything contributes the same whenever it does.
+            self.extra.clear();
+            return true;
+        }
         matrix.resize(n * n, 0.0);
         for col in 0..i {
             let from = (b + col) * r + b;
             matrix[col * n + col..col * n + i].copy_from_slice(&front[from + col..from + i]);
         }
-        self.panel.truncate(if touched { r * b } else { 0 });
 
         // Tractions, then the geometric row: flank nodes, bore nodes, one row after the other.
         let panel = if self.panel.is_empty() { &cell.free_body[..r * b] } else { &self.panel };
@@ -330,9 +338,7 @@ pub fn rotate_sides<const W: usize>(x: &mut [[f64; W]], turn: Turn) {
 /// Rotates vectors, x and y in turn.
 #[inline]
 pub fn rotate_pairs(x: &mut [f64], turn: Turn) {
-    for p in x.chunks_exact_mut(2) {
-        [p[0], p[1]] = rotate([p[0], p[1]], turn);
-    }
+    rotate_sides(one_mut(x), turn);
 }
 
 /// Dot product in four strands: at these lengths a kernel is not worth its call.

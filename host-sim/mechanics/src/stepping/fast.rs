@@ -256,6 +256,7 @@ impl<'p> CondensedWheels<'p> {
         tangent: &mut CellTangent,
         tractions: Vec<Traction>,
         contribution: &mut Contribution,
+        front: &mut Vec<f64>,
     ) -> bool {
         let mesh = self.model.fs_mesh();
         let (cell, _) = self.model.flexspline.cell(j, self.live[j]);
@@ -270,22 +271,24 @@ impl<'p> CondensedWheels<'p> {
             blocks: [j as u32, ((j + 1) % mesh.teeth) as u32],
         };
         let geometric = Geometric { a: &state.turn_rate, g: &g, c };
-        let contact = |matrix: &mut [f64], order: usize| self.add_bore_contact(j, matrix, order);
-        tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), contact, contribution)
+        let touched = self.touched_body(j, front).then_some(front.as_mut_slice());
+        tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), touched, contribution)
     }
 
-    /// Adds the contact on the bore of a cell to the matrix of its bore and face nodes; whether there is any.
-    fn add_bore_contact(&self, j: usize, matrix: &mut [f64], order: usize) -> bool {
+    /// The matrix of bore and face nodes of a cell with the contact on its bore, if there is any.
+    fn touched_body(&self, j: usize, matrix: &mut Vec<f64>) -> bool {
         let mesh = self.model.fs_mesh();
         let (cell, _) = self.model.flexspline.cell(j, false);
-        let (b, face) = (cell.bore(), cell.face());
+        let [b, face, order] = [cell.bore(), cell.face(), cell.bore() + 2 * cell.face()];
         let per_cell = mesh.base_edges.len();
         let (sin, cos) = (mesh.sector_angle(j) + self.states[j].turn).sin_cos();
         let first = self.bore.partition_point(|(edge, _)| *edge < j * per_cell);
         let touching = self.bore[first..].iter().take_while(|(edge, _)| *edge < (j + 1) * per_cell);
         let mut any = false;
         for (edge, k) in touching {
-            any = true;
+            if !std::mem::replace(&mut any, true) {
+                matrix.clone_from(&cell.body);
+            }
             // Nodes along the bore of the cell: corner of the first face, bore nodes, corner of the second face.
             let place = |n: usize| match n {
                 0 => b,
@@ -332,7 +335,7 @@ impl<'p> CondensedWheels<'p> {
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
         };
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
-        tangent.reduce(self.kernels, cell, (place, tractions), None, |_, _| false, contribution)
+        tangent.reduce(self.kernels, cell, (place, tractions), None, None, contribution)
     }
 
     /// Places the flank nodes of these cells where they stand while no force acts on them.
@@ -559,11 +562,12 @@ impl Wheels for CondensedWheels<'_> {
         factor.live.clone_from(&self.live);
         let mut contributions = std::mem::take(&mut self.contributions);
         contributions.resize_with(factor.cells.len(), Contribution::default);
+        let mut front = Vec::new();
         let mut cells = factor.cells.iter_mut().zip(&mut contributions).enumerate();
         let mut definite = cells.all(|(c, (tangent, contribution))| {
             let tractions = std::mem::take(&mut tractions[c]);
             if c < fs_cells {
-                self.reduce_flexspline_cell(c, tangent, tractions, contribution)
+                self.reduce_flexspline_cell(c, tangent, tractions, contribution, &mut front)
             } else {
                 self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions, contribution)
             }
@@ -580,7 +584,7 @@ impl Wheels for CondensedWheels<'_> {
                     matrix[n + 1] += ANCHOR;
                 }
                 if diagonal != 0.0 || k == 0 {
-                    contributions.push(Contribution { blocks: vec![k as u32], matrix });
+                    contributions.push(Contribution { blocks: vec![k as u32], matrix, before: 0 });
                 }
             }
             definite = factor.chain.factorise(&blocks, &contributions);
