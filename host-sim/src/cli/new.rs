@@ -27,9 +27,9 @@ use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, 
 /// from them has its formula in the file. It has a cup and balls in proportion, which are guesses since no catalogue
 /// prints them, and from i = 50 to 160 the compliance that catalogues have beside them (output.contact_compliance);
 /// --plane leaves all of it out. With --like its [data_sheet] is filled in where the catalogue's figures are at hand.
-/// Friction and errors of making are left out. Beside the file its sizes are drawn, to scale (.svg). --set flexspline.profile=s makes S-shaped teeth for the cam. A catalogue
-/// model (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for
-/// `diagnose --model` and `synthesize --model`.
+/// Friction and errors of making are left out. --set flexspline.profile=s makes S-shaped teeth for the cam. Beside the
+/// file its sizes are drawn, to scale (.svg). A catalogue model (a file with "nominal" in its name, or --kind nominal)
+/// has the few numbers that a catalogue gives, for `diagnose --model` and `synthesize --model`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -71,7 +71,6 @@ pub struct PlaceStress {
     /// The tooth of the flexspline, from 0, that has it on the finest mesh.
     pub tooth: usize,
     /// How it bears the waves of the generator; of root fillets of steel.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub fatigue: Option<Fatigue>,
 }
 
@@ -83,7 +82,6 @@ pub struct Fatigue {
     /// The middle, MPa; positive in tension.
     pub mean_mpa: f64,
     /// Turns of the generator that are to be borne; missing where any number is.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub turns: Option<u64>,
     /// How many times as large both may be.
     pub safety: f64,
@@ -91,12 +89,10 @@ pub struct Fatigue {
 
 /// Tensile strength, MPa. *Source*: 34CrNiMo6 +QT, 16 to 40 mm (EN 10083-3: 1100 to 1300 MPa).
 const TENSILE_MPA: f64 = 1100.0;
-/// Share of it that is borne for ever where tension and compression alternate, cycles from which that is so, and how
-/// the share falls below: with the power -1/5 of the cycles. *Source*: FKM Guideline (6th edition, 2012), steels that
-/// are neither case-hardened nor stainless.
+/// Share of it that may alternate endlessly. *Source*: FKM Guideline (2012), no case-hardened nor stainless steels.
 const ALTERNATING: f64 = 0.45;
-const KNEE_CYCLES: f64 = 1e6;
-const KNEE_POWER: f64 = 0.2;
+/// Cycles from which that is so, and the power of them by which it falls below. *Source*: the same.
+const KNEE: (f64, f64) = (1e6, 0.2);
 /// Young's moduli of such steels, MPa. *Source*: EN 10083 and EN 10088 have 200 to 215 GPa; and some room.
 const STEEL_MPA: [f64; 2] = [190e3, 220e3];
 
@@ -104,8 +100,8 @@ impl Fatigue {
     /// By the line of Goodman, from what alternating stress alone to what a steady one alone may be.
     fn of([amplitude_mpa, mean_mpa]: [f64; 2], turns: Option<u64>) -> Fatigue {
         // Two waves pass in a turn.
-        let cycles = turns.map_or(KNEE_CYCLES, |turns| (2.0 * turns as f64).min(KNEE_CYCLES));
-        let bears_mpa = ALTERNATING * TENSILE_MPA * (KNEE_CYCLES / cycles).powf(KNEE_POWER);
+        let cycles = turns.map_or(KNEE.0, |turns| (2.0 * turns as f64).min(KNEE.0));
+        let bears_mpa = ALTERNATING * TENSILE_MPA * (KNEE.0 / cycles).powf(KNEE.1);
         let used = amplitude_mpa / bears_mpa.min(TENSILE_MPA) + mean_mpa.max(0.0) / TENSILE_MPA;
         Fatigue { amplitude_mpa, mean_mpa, turns, safety: used.recip() }
     }
@@ -184,8 +180,7 @@ fn edge_at(mesh: &WheelMesh, u: &[f64], edge: &SurfaceEdge, tooth: usize) -> [[[
     [nodes.map(|n| mesh.nodes[n]), nodes.map(|n| [u[2 * n], u[2 * n + 1]])]
 }
 
-/// Amplitude and mean, MPa, of the stress along each piece of the fillets over a turn of the generator. The wave comes
-/// to every tooth alike: what one sees in turn, all see now.
+/// Amplitude and mean of the stress along each piece of the fillets in a turn, MPa: what one tooth sees all see now.
 fn fillet_cycles(problem: &Problem, state: &State) -> Vec<[f64; 2]> {
     let mesh = &problem.flexspline;
     let cycles = |edge: SurfaceEdge| {
@@ -360,31 +355,16 @@ mod tests {
         }
     }
 
-    /// What a tooth sees while the generator turns is what all of them see of it standing.
     #[test]
-    fn a_tooth_sees_in_turn_what_all_see_at_once() {
+    fn a_tooth_sees_in_a_turn_what_all_see_at_once() {
         let (drive, settings) = (Drive::hhd_95(), SolverSettings::default());
-        let at = |generator_rad: f64, teeth: fn(usize) -> std::ops::Range<usize>| {
-            let at = (generator_rad, 40.0);
-            on_mesh(&drive, GeneratorKind::Cam, 20.0, at, 1, settings, |problem, state| {
-                let edge = fillet_edges(&problem.flexspline)[0];
-                let of = |tooth: usize| {
-                    let [positions, moved] = edge_at(&problem.flexspline, &state.u, &edge, tooth);
-                    along_edge(positions, moved, &problem.material)[0]
-                };
-                (teeth(problem.flexspline.teeth).map(of).collect(), fillet_cycles(problem, state)[0])
-            })
-            .unwrap()
+        let cycle = |generator_rad: f64| {
+            let look = |problem: &Problem, state: &State| fillet_cycles(problem, state)[0];
+            on_mesh(&drive, GeneratorKind::Cam, 20.0, (generator_rad, 40.0), 1, settings, look).unwrap()
         };
-        let (all, [amplitude, mean]): (Vec<f64>, [f64; 2]) = at(0.0, |teeth| 0..teeth);
-        let in_turn = (0..8).map(|k| at(f64::from(k) * std::f64::consts::PI / 8.0, |_| 0..1).0[0]);
-        for (k, stress) in in_turn.enumerate() {
-            // The flexspline stands: half a turn of the generator has 94 teeth.
-            let like = all[(188 - (k * 188 / 16) % 188) % 188];
-            assert!((stress - mean).abs() < 1.02 * amplitude, "{k}: {stress} of {mean} and {amplitude}");
-            assert!((stress - like).abs() < 0.25 * amplitude, "{k}: {stress} for {like}");
-        }
-        assert!(amplitude > 50.0 && all.iter().any(|of| *of > mean + 0.99 * amplitude));
+        let ([amplitude, mean], turned) = (cycle(0.0), cycle(0.77));
+        assert!((turned[0] / amplitude - 1.0).abs() < 0.05 && (turned[1] - mean).abs() < 0.05 * amplitude);
+        assert!(amplitude > 50.0 && mean.abs() < amplitude);
     }
 
     #[test]
@@ -393,7 +373,6 @@ mod tests {
         assert!((safety([247.5, 0.0], None) - 2.0).abs() < 1e-12, "half of 45 % of 1100 MPa");
         assert!((safety([247.5, 275.0], None) - 4.0 / 3.0).abs() < 1e-12);
         assert_eq!(safety([247.5, -100.0], None), safety([247.5, 0.0], None), "pressure helps, and is not counted");
-        assert_eq!(safety([247.5, 0.0], Some(500_000)), safety([247.5, 0.0], Some(1 << 40)));
         let fewer = safety([247.5, 0.0], Some(500_000 / 32));
         assert!((fewer - 4.0).abs() < 1e-5, "a 32nd of the cycles, twice the stress: {fewer}");
         assert!((safety([1100.0, 0.0], Some(1)) - 1.0).abs() < 1e-12, "no more than breaks it at once");

@@ -145,7 +145,7 @@ pub const BETWEEN_READINGS: &str = "time between the readings";
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
 /// The output goes from one flank to the other in some milliseconds. *Guess*.
 pub(super) const FLANK_S: f64 = 5e-3;
-/// Spread of the drag of an output, of the load, where the friction of the nominal model is less. *Guess*.
+/// Spread of the drag of an output, of the load, where the nominal model states no friction. *Guess*.
 const DRAG_OF_LOAD: f64 = 0.02;
 /// Prior standard deviation of what no drawing fixes, arcsec: the offset of the output encoder. *Guess*: 2.8°, so wide
 /// that the data alone decide.
@@ -230,8 +230,8 @@ impl Base {
         // Nor does a catalogue print the drag of the output, which winds a drive up against its motion.
         let slope = |torque: f64| nominal.wind_up_arcsec(torque + 0.5) - nominal.wind_up_arcsec(torque - 0.5);
         let against = |k: usize| -rows.direction[k] * nominal.ratio.signum() * slope(rows.torque[k]);
-        let drag_n_m = nominal.friction_torque_n_m.max(DRAG_OF_LOAD * rows.load_scale());
-        add("drag", (0..rows.len()).map(against).collect(), drag_n_m);
+        let unknown_n_m = if nominal.friction_torque_n_m > 0.0 { 0.0 } else { DRAG_OF_LOAD * rows.load_scale() };
+        add("drag", (0..rows.len()).map(against).collect(), unknown_n_m);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
         for harmonic in &nominal.harmonics {

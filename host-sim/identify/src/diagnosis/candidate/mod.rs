@@ -421,7 +421,7 @@ pub(crate) struct Acts {
     pub tolerance_of: Option<&'static str>,
 }
 
-/// A drive winds up by more than this under 1 N·m, arcsec: of the catalogue the stiffest is a hundredth as stiff.
+/// A drive winds up by more than this under 1 N·m, arcsec. *Guess*: the stiffest of catalogues a hundred times as far.
 const LEAST_WIND_UP_ARCSEC: f64 = 1e-4;
 /// Size of all deviations over that of the law, at most: beyond, the law is there for its deviations.
 const MOST_NUISANCE: f64 = 0.9;
