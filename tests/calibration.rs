@@ -157,7 +157,7 @@ fn a_motor_zero_that_is_off_by_whole_turns_is_put_right_where_the_output_says_it
         };
         let rms = |json: &Value| json["rms_residual_arcsec"].as_f64().unwrap();
         let right = replayed("log.csv");
-        assert!(right["notes"] == serde_json::json!([]) && rms(&right) < 10.0, "{right}");
+        assert!(!right["notes"].to_string().contains("the generator reads") && rms(&right) < 10.0, "{right}");
         desk.write("off.csv", &log_of(ratio, 300.0, turns, 0.0));
         let put = replayed("off.csv");
         let reads = put["notes"].to_string().split("the generator reads ").nth(1).map(str::to_owned).unwrap();

@@ -63,8 +63,7 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
     let run = desk.line("new mine.toml --force").done();
     assert!(run.stdout.starts_with("wrote mine.toml"), "{}", run.stdout);
     assert_eq!(next(&run), ["drive --check --drive mine.toml", "tables --drive mine.toml"]);
-    let checked = desk.line(next(&run)[0]).done();
-    assert_eq!(next(&checked), ["tables --drive mine.toml"]);
+    assert_eq!(next(&desk.line(next(&run)[0]).done()), ["tables --drive mine.toml"]);
     for (line, said) in [
         ("new out.d/x.toml", "out.d/x.toml: there is no folder out.d"),
         ("new .", ".: is a folder"),
@@ -76,7 +75,8 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
         assert_eq!(run.code, 2, "{line}");
         assert!(run.stderr.contains(said), "{line}: {}", run.stderr);
     }
-    assert_eq!(names(&desk.path(".")), ["a.toml", "b.toml", "c.toml", "d.toml", "mine.toml"]);
+    let pair = |name: &str| [format!("{name}.svg"), format!("{name}.toml")];
+    assert_eq!(names(&desk.path(".")), ["a", "b", "c", "d", "mine"].map(pair).concat());
 }
 
 #[test]
