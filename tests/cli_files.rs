@@ -66,6 +66,7 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
     assert_eq!(next(&desk.line(next(&run)[0]).done()), ["tables --drive mine.toml"]);
     for (line, said) in [
         ("new out.d/x.toml", "out.d/x.toml: there is no folder out.d"),
+        ("new x.svg", "x.svg: is where the sketch goes"),
         ("new .", ".: is a folder"),
         ("new x.toml --drive HHD-9", "--drive: found \"HHD-9\""),
         ("new x.toml --set flanks.friction_coefficent=0.1", "did you mean `flanks.friction_coefficient`?"),

@@ -1,6 +1,6 @@
 //! `flexspline new`: a file to start from, with every field explained.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -195,8 +195,8 @@ impl New {
             }
             None => None,
         };
-        self.check()?;
         let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
+        let files = self.files(kind)?;
         let data_sheet = self.sheet().filter(|_| kind == NewKind::Drive);
         let mut made = made;
         let under_load = match &mut made {
@@ -220,7 +220,7 @@ impl New {
         let is_involute = drive.flexspline.profile == Profile::Involute;
         let mended = teeth.as_ref().filter(binds).and(numbers).filter(|_| is_involute);
         let shift = mended.and_then(|numbers| numbers.shift(&drive).ok());
-        let (text, drive_hash, next) = match kind {
+        let (texts, drive_hash, next) = match kind {
             NewKind::Drive => {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
                 let next = next_of(&file, teeth.as_ref(), self.generator);
@@ -229,22 +229,18 @@ impl New {
                     None => drive.to_toml(),
                 };
                 let sheet = data_sheet.as_ref().map_or_else(|| TEMPLATE.to_owned(), Stated::to_toml);
-                (text + &sheet, Some(hash), next)
+                (vec![text + &sheet, sketch(&drive).map_err(bad_input)?], Some(hash), next)
             }
             NewKind::Nominal => {
                 let next = vec![
                     format!("flexspline synthesize --model {file} --effect circular_spline_eccentricity --out try"),
                     format!("flexspline diagnose try/data.csv --model {file} --out try"),
                 ];
-                (Nominal::template(drive.flexspline.teeth, drive.circular_spline.teeth), None, next)
+                (vec![Nominal::template(drive.flexspline.teeth, drive.circular_spline.teeth)], None, next)
             }
         };
-        write_whole(&self.file, |out| out.write_all(text.as_bytes())).map_err(bad_input)?;
-        let mut files = vec![self.file.clone()];
-        if kind == NewKind::Drive {
-            let (svg, drawn) = (self.file.with_extension("svg"), sketch(&drive).map_err(bad_input)?);
-            write_whole(&svg, |out| out.write_all(drawn.as_bytes())).map_err(bad_input)?;
-            files.push(svg);
+        for (file, text) in files.iter().zip(&texts) {
+            write_whole(file, |out| out.write_all(text.as_bytes())).map_err(bad_input)?;
         }
         let written = NewReport {
             schema_version: 1,
@@ -417,24 +413,26 @@ impl New {
         if name.contains("nominal") { NewKind::Nominal } else { NewKind::Drive }
     }
 
-    /// Refuses a place where nothing may be written.
-    fn check(&self) -> Result<(), Failure> {
-        let shown = self.file.display();
-        let refuse = |what: &str| Err(Failure::BadInput(format!("{shown}: {what}")));
+    /// What is written: the file, and behind it the sketch of a drive. Refuses a place where nothing may be.
+    fn files(&self, kind: NewKind) -> Result<Vec<PathBuf>, Failure> {
+        let refuse = |file: &Path, what: &str| Err(Failure::BadInput(format!("{}: {what}", file.display())));
         if self.file.is_dir() {
-            return refuse("is a folder; allowed: the name of a file");
+            return refuse(&self.file, "is a folder; allowed: the name of a file");
         }
-        for file in [self.file.clone(), self.file.with_extension("svg")] {
-            if file.symlink_metadata().is_ok() && !self.force {
-                let what = "is there already; give another name, or --force to replace it";
-                return Err(Failure::BadInput(format!("{}: {what}", file.display())));
-            }
+        let sketch = (kind == NewKind::Drive).then(|| self.file.with_extension("svg"));
+        if sketch.as_ref() == Some(&self.file) {
+            return refuse(&self.file, "is where the sketch goes; allowed: a name with another ending, as .toml");
+        }
+        let files: Vec<PathBuf> = [self.file.clone()].into_iter().chain(sketch).collect();
+        let is_there = |file: &&PathBuf| file.symlink_metadata().is_ok() && !self.force;
+        if let Some(file) = files.iter().find(is_there) {
+            return refuse(file, "is there already; give another name, or --force to replace it");
         }
         match self.file.parent() {
             Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-                refuse(&format!("there is no folder {}", folder.display()))
+                refuse(&self.file, &format!("there is no folder {}", folder.display()))
             }
-            _ => Ok(()),
+            _ => Ok(files),
         }
     }
 }

@@ -40,7 +40,7 @@ pub(crate) struct Problem<'a> {
 }
 
 /// How much of a law is evaluated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Extent {
     /// All columns.
     Whole,
