@@ -503,7 +503,9 @@ await check("the selector changes what is shown", async () => {
   await page.waitForFunction((id) => document.documentElement.dataset.ready === id, last);
   const shown = await page.locator(".headline:visible").count();
   assert(shown === 1, `${shown} headlines`);
-  const drawn = await page.locator(".drawing:not(.empty):has(canvas)").evaluateAll((all) => all.map((e) => e.dataset.drawn));
+  const drawn = await page
+    .locator(".drawing:not(.empty):has(canvas)")
+    .evaluateAll((all) => all.map((e) => e.dataset.drawn));
   assert(
     drawn.every((d) => d === last),
     `drawn: ${drawn}`,
