@@ -346,14 +346,6 @@ mod tests {
     }
 
     #[test]
-    fn uncertainty_is_half_the_interval() {
-        let mut state = PlayState::unknown();
-        let _ = state.update(OutputAngle::ZERO, 0, 68_357, true);
-        assert!((state.uncertainty_rad() - 1e-4).abs() < 2e-9);
-        assert!(state.offset_rad().abs() < 2e-9);
-    }
-
-    #[test]
     fn hostile_half_widths_stay_in_bounds() {
         for half in [i32::MIN, -1, 0, i32::MAX] {
             let mut state = PlayState::unknown();

@@ -1248,20 +1248,6 @@ mod tests {
         }
     }
 
-    /// A tick is missed at 60 % of the largest speed: the side of the play is known as before.
-    #[test]
-    fn one_missed_tick_at_speed_costs_nothing() {
-        let mut run = Loop::new(Overrun::SkipAndCount);
-        let mut at = 0.0;
-        for tick in 0..40 {
-            let missed_ticks = u16::from(tick == 20);
-            at += 0.42 * (f64::from(missed_ticks) + 1.0);
-            let input = Input { generator: GeneratorAngle::from_rad(at), missed_ticks, ..run.input(at / 95.0) };
-            let out = run.joint.tick(&images(), &mut run.store, &mut run.state, &input);
-            assert!(!out.flags.contains(Flags::GLITCH) && (tick < 3 || run.state.play().is_known()), "{tick}: {out:?}");
-        }
-    }
-
     #[test]
     fn a_reset_in_the_middle_of_a_reversal_goes_on_where_it_was_or_starts_anew() {
         let mut run = Loop::new(Overrun::SkipAndCount);

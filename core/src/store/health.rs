@@ -88,14 +88,3 @@ impl fmt::Display for ActivateError {
 impl core::error::Error for ActivateError {}
 
 bits_of!(Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes });
-
-#[cfg(test)]
-mod tests {
-    use super::Health;
-
-    #[test]
-    fn a_health_comes_back_from_its_number() {
-        assert!((0..).zip(Health::ALL).all(|(n, h)| h.code() == n && Health::from_code(n) == Some(h)));
-        assert_eq!((Health::Torn.code(), Health::from_code(5)), (4, None));
-    }
-}

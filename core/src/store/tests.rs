@@ -1,11 +1,11 @@
 use super::*;
 use crate::error::ImageError;
-use crate::fixture::{self, ARCSEC};
+use crate::fixture;
 use crate::table::TableModel;
 use crate::upset::Upset;
 use crate::{
-    Adjustment, FixedMember, Flags, GeneratorAngle, Input, Joint, JointState, Limits, Mode, Output, OutputAngle,
-    Overrun, PlayState, Quality, Table,
+    Adjustment, FixedMember, Flags, GeneratorAngle, Input, Joint, JointState, Limits, Mode, Output, Overrun, PlayState,
+    Quality, Table,
 };
 use std::sync::LazyLock;
 use std::vec::Vec;
@@ -316,20 +316,6 @@ fn no_upset_is_used() {
 }
 
 #[test]
-#[ignore = "a million flips"]
-fn no_upset_of_a_million_is_used() {
-    let mut sum = [0; 4];
-    for seed in 2..6 {
-        let found = campaign(300_000, seed);
-        sum.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
-    }
-    let [flips, flagged, mended, pages] = sum;
-    std::println!(
-        "{flips} flips: {flagged} ticks in doubt, {mended} words mended, {pages} pages of images found damaged"
-    );
-}
-
-#[test]
 fn a_damaged_page_of_one_image_is_named_and_mended() {
     let mut damaged = IMAGE.clone();
     damaged[1000] ^= 4;
@@ -611,36 +597,6 @@ fn the_joint_of_another_drive_is_not_corrected() {
     let found = other.unwrap().tick(&images, &mut store, &mut JointState::new(), &Motion::new(1).next());
     assert!(found.flags.contains(Flags::TABLE_DOUBT) && found.flags.contains(Flags::NOT_CORRECTED));
     assert_eq!((found.quality, found.correction_rad), (Quality::Disabled, 0.0));
-}
-
-#[test]
-fn targets_are_met_as_by_the_table_in_place() {
-    let (mut store, images) = (active(20.0), Images::new(&IMAGE, &TWIN));
-    let mut state = JointState::new();
-    state.request(Mode::Tracking).unwrap();
-    let mut generator = GeneratorAngle::ZERO;
-    let mut worst: f64 = 0.0;
-    for i in 0..20_000i32 {
-        let place = if (i / 4000) % 2 == 0 { i % 4000 } else { 4000 - i % 4000 };
-        let target = OutputAngle::from_rad(1e-3 + place as f64 * 1.0e-5).unwrap();
-        let input = Input {
-            generator: Some(generator),
-            target,
-            torque_n_m: 5.0,
-            missed_ticks: 0,
-            adjustment: Adjustment::default(),
-        };
-        let found = joint().tick(&images, &mut store, &mut state, &input);
-        // The generator goes where it is commanded; a while after a reversal the correction has caught up.
-        generator = found.command;
-        if i > 200 && i % 4000 > 200 {
-            let mut play = *state.play();
-            let table = Table::check(&IMAGE).unwrap();
-            let there = table.forward(&mut play, generator, 5.0, 20.0);
-            worst = worst.max(there.output.minus_rad(target).abs() as f64);
-        }
-    }
-    assert!(worst < 0.01 * ARCSEC, "{} arcsec", worst / ARCSEC);
 }
 
 /// Two stores: a table is checked and filled in beside the one in use, in the background; between two ticks they are

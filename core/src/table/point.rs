@@ -157,12 +157,6 @@ impl OperatingPoint {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_quality_comes_back_from_its_number() {
-        assert!((0..).zip(Quality::ALL).all(|(n, q)| q.code() == n && Quality::from_code(n) == Some(q)));
-        assert_eq!((Quality::Disabled.code(), Quality::from_code(4)), (3, None));
-    }
-
     fn point(mean: f32, half_width: f32) -> OperatingPoint {
         let place = TorquePlace { weight: 0.0, width: 1.0, jump: false };
         OperatingPoint::new(place, [[mean, 0.0, half_width]; 2], [0; 2], (0, 0), (true, true), Doubt(0))

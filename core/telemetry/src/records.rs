@@ -453,26 +453,6 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_are_where_they_are_said_to_be() {
-        let record = Record {
-            number: 0x0102,
-            lost: 3,
-            ..Record::of(0x0a0b_0c0d, &JointState::new(), &Store::new(), &output(1.0))
-        };
-        let bytes = record.encode();
-        assert_eq!(bytes[..4], [b'F', b'X', 2, 1 | 3 << 4]);
-        assert_eq!(bytes[4..12], [2, 1, 3, 0, 0x0d, 0x0c, 0x0b, 0x0a]);
-        assert_eq!(bytes[12..16], [2, 0, 0, 0]);
-        assert_eq!(bytes[16..24], (-5i64).to_le_bytes());
-        for (offset, value) in [(24, 1.0f32), (28, 2.0), (32, 3.0), (36, 4.0)] {
-            assert_eq!(bytes[offset..offset + 4], value.to_le_bytes());
-        }
-        assert_eq!(bytes[40..48], [0; 8]);
-        assert_eq!(record.output(), OutputAngle::from_counts(-5));
-        assert!(record.has(Flags::GLITCH) && !record.has(Flags::OVERRUN));
-    }
-
-    #[test]
     fn damaged_records_are_refused_and_named() {
         let bytes = Record::of(7, &JointState::new(), &Store::new(), &output(1.0)).encode();
         for bit in 0..RECORD_BYTES * 8 {
