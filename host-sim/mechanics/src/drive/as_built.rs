@@ -318,14 +318,6 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn a_harmonic_has_its_crest_at_its_phase() {
-        let harmonic = Harmonic { order: 3, amplitude_um: 5.0, phase_deg: 20.0 };
-        assert!((harmonic.at(20f64.to_radians()) - 5.0).abs() < 1e-14);
-        assert!((harmonic.at(140f64.to_radians()) - 5.0).abs() < 1e-13);
-        assert!((harmonic.at(80f64.to_radians()) + 5.0).abs() < 1e-13);
-    }
-
-    #[test]
     fn a_rim_repeats_after_the_common_period_of_its_harmonics() {
         let with = |orders: &[u32]| {
             let harmonic = |&order: &u32| Harmonic { order, amplitude_um: 1.0, phase_deg: 7.0 };

@@ -585,24 +585,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn rollers_that_overlap_are_refused() {
-        let mut drive = Drive::hhd_95();
-        drive.generator.roller_diameter_mm = 40.0;
-        assert!(GeneratorOutline::new(&drive, GeneratorKind::TwoRoller).is_ok());
-        let message = GeneratorOutline::new(&drive, GeneratorKind::FourRoller).unwrap_err().to_string();
-        assert!(message.starts_with("generator.roller_diameter_mm: 40 mm is too large"), "{message}");
-    }
-
-    #[test]
-    fn a_warm_generator_grows_with_its_own_expansion() {
-        let cold = outline(GeneratorKind::Cam);
-        let mut drive = Drive::hhd_95();
-        drive.temperature.generator_expansion_per_k = 2e-5;
-        drive.temperature.flexspline_expansion_per_k = 1e-5;
-        let warm = GeneratorOutline::new(&drive.at_temperature(70.0), GeneratorKind::Cam).unwrap();
-        let growth = cold.nearest([0.0, 50.0]).distance - warm.nearest([0.0, 50.0]).distance;
-        assert!((growth - 46.1697 * 1e-3).abs() < 1e-7, "{growth}");
-    }
 }
