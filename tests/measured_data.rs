@@ -613,27 +613,3 @@ fn columns_are_mapped_and_wrong_mappings_say_so() {
     let error = parse("m.csv", text.as_bytes(), &map, &Gear::of_ratio(0.0)).unwrap_err().to_string();
     assert!(error.contains("ratio: found 0"), "{error}");
 }
-
-/// Ten million rows:
-/// `cargo test --release --test claims ten_million -- --ignored --nocapture`.
-#[test]
-#[ignore = "takes a minute and a gigabyte and a half"]
-fn ten_million_rows() {
-    use std::io::Write;
-    let mut text = b"time_s,generator_rad,output_rad,torque_n_m,temperature_c\n".to_vec();
-    let mut random = fastrand::Rng::with_seed(1);
-    for k in 0..10_000_000 {
-        let k = f64::from(k);
-        let psi = 0.01 * k;
-        let output = psi / RATIO + (10.0 * (2.0 * psi).sin() + normal(&mut random)) * ARCSEC;
-        writeln!(text, "{:.4},{psi:.4},{output:.9},{:.2},20.0", k * 0.001, 10.0 * (psi * 0.01).sin()).unwrap();
-    }
-    let start = std::time::Instant::now();
-    let read = parse("m.csv", text, &ColumnMap::default(), &gear()).unwrap();
-    let seconds = start.elapsed().as_secs_f64();
-    assert_eq!(read.rows, 10_000_000);
-    assert_eq!(read.faults, []);
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let peak = status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or("").to_owned();
-    println!("{seconds:.1} s, {peak}");
-}
