@@ -247,44 +247,6 @@ fn elsewhere(file: &str) -> Option<String> {
     std::fs::read_to_string(PathBuf::from(folder).join(file)).ok()
 }
 
-#[test]
-fn joints_of_a_robot_and_printed_drives_have_no_fault_but_what_is_in_them() {
-    // Joint angle and joint torque of seven strain wave joints at 1 kHz, with steps of time up to 8.8 ms. There is no
-    // motor angle: the joint angle stands for the generator, the torque's wind-up for the error.
-    let Some(text) = elsewhere("franka_panda_7joints/exciting_trajectory.csv") else {
-        println!("skipped: FLEXSPLINE_DATA does not hold the data");
-        return;
-    };
-    for joint in 1..=7 {
-        let mut lines = text.lines();
-        let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-        let place = |name: String| names.iter().position(|n| *n == name).unwrap();
-        let (q, tau) = (place(format!("q{joint}")), place(format!("tau{joint}")));
-        let mut table = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
-        for line in lines {
-            let fields: Vec<&str> = line.split(',').collect();
-            let torque: f64 = fields[tau].parse().unwrap();
-            let generator: f64 = fields[q].parse::<f64>().unwrap() * 100.0;
-            table.push_str(&format!("{},{generator:.5},{:.4},{torque}\n", fields[0], torque * 6.0));
-        }
-        let read = parse("franka", table.as_bytes(), &ColumnMap::default(), &Gear::of_ratio(100.0)).unwrap();
-        let found: Vec<_> =
-            read.faults.iter().map(|fault| (fault.name, fault.channel, fault.rows, &fault.what)).collect();
-        println!("joint {joint}: {found:?} {:?}", read.notes);
-        assert!(read.tooth_steps.is_empty());
-    }
-    for file in ["base_runin5", "split_4pre5", "conic_4pre5"] {
-        let text = elsewhere(&format!("cycloidal_printed_hysteresis/{file}.csv")).unwrap();
-        // The output is held, the motor winds the drive up: angle against torque, the motor's angle being the error
-        // itself.
-        let map = ColumnMap::parse("time=t_s:s,generator=angle_arcmin:arcmin,error=torque_cmd_Nm:arcsec").unwrap();
-        let read = parse(file, text.as_bytes(), &map, &Gear::of_ratio(15.0)).unwrap();
-        let found: Vec<_> =
-            read.faults.iter().map(|fault| (fault.name, fault.channel, fault.rows, &fault.what)).collect();
-        println!("{file}: {} sessions, {found:?} {:?}", read.sessions.len(), read.notes);
-    }
-}
-
 /// Output held, motor wound up and let go: a loop of torque over angle, three hundred times as wide as that of a strain
 /// wave gear. Load alone acts, so that nothing of teeth, encoders, temperature or speed is named with confidence.
 #[test]
