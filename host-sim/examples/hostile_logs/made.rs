@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use fastrand::Rng;
 
 /// Ratio of the drive.
-pub const RATIO: f64 = -94.0;
+const RATIO: f64 = -94.0;
 const ARCSEC: f64 = PI / 648_000.0;
 
 /// The model that the files are held against.
