@@ -972,6 +972,7 @@ mod tests {
     use core::ptr::{null, null_mut};
     use flexspline::testing::fixture;
     use std::boxed::Box;
+    use std::sync::LazyLock;
     use std::vec::Vec;
 
     pub(super) const SETTINGS: FlexsplineSettings = FlexsplineSettings {
@@ -1030,6 +1031,20 @@ mod tests {
         }
     }
 
+    /// A table twice.
+    pub(super) static TABLE: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| [false; 2].map(fixture::image));
+
+    pub(super) fn table() -> FlexsplineImages {
+        pair(&TABLE[0], &TABLE[1])
+    }
+
+    /// Objects with the table in use.
+    pub(super) fn active() -> (Objects, FlexsplineImages) {
+        let (mut o, table) = (made(), table());
+        assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+        (o, table)
+    }
+
     pub(super) const INPUT: FlexsplineInput = FlexsplineInput {
         generator_counts: 1 << 30,
         target_counts: 11_000_000,
@@ -1042,10 +1057,7 @@ mod tests {
 
     #[test]
     fn a_tick_through_c_is_a_tick() {
-        let image = fixture::image(false);
-        let twin = image.clone();
-        let (mut o, table) = (made(), pair(&image, &twin));
-        assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+        let (mut o, table) = active();
         assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
         let mut out = FlexsplineOutput::default();
         assert_eq!(
@@ -1053,17 +1065,8 @@ mod tests {
             FlexsplineStatus::Ok
         );
 
-        let twin = image.clone();
-        let images = Images::new(&image, &twin);
-        let limits = Limits {
-            tick_s: 1e-3,
-            rate_rad_s: 0.05,
-            acceleration_rad_s2: 5.0,
-            generator_rate_rad_s: 600.0,
-            debounce_ticks: 5,
-            deadband_rad: 0.0,
-        };
-        let joint = Joint::new(fixture::drive(), limits, Overrun::FadeOut { ticks: 50 }).unwrap();
+        let images = Images::new(&TABLE[0], &TABLE[1]);
+        let joint = Joint::new(fixture::drive(), LIMITS, Overrun::FadeOut { ticks: 50 }).unwrap();
         let (mut store, mut state) = (Store::new(), JointState::new());
         store.activate(&images, &fixture::drive(), 20.0).unwrap();
         state.request(Mode::Tracking).unwrap();
@@ -1100,9 +1103,7 @@ mod tests {
 
     #[test]
     fn a_table_is_activated_in_steps() {
-        let image = fixture::image(false);
-        let twin = image.clone();
-        let (mut o, table) = (made(), pair(&image, &twin));
+        let (mut o, table) = (made(), table());
         let mut activation = Box::new(FlexsplineActivation { opaque: [MaybeUninit::new(7); _] });
         let mut progress = 9;
         let step = |o: &mut Objects, activation: &mut FlexsplineActivation, progress: &mut u8| {
@@ -1172,12 +1173,7 @@ mod tests {
     fn what_is_known_can_be_read_and_mended() {
         let mut images = [fixture::image(false), fixture::image(false)];
         images[1][700] ^= 4;
-        let table = |images: &[Vec<u8>; 2]| FlexsplineImages {
-            first: images[0].as_ptr(),
-            first_bytes: images[0].len(),
-            second: images[1].as_ptr(),
-            second_bytes: images[1].len(),
-        };
+        let table = |images: &[Vec<u8>; 2]| pair(&images[0], &images[1]);
         let mut o = made();
         let mut seen = FlexsplineStoreReport::default();
         let mut report = |store: &FlexsplineStore| {
@@ -1226,9 +1222,7 @@ mod tests {
     #[test]
     fn every_argument_is_checked() {
         use FlexsplineStatus::{Argument, Image, Mode, NotInitialised, OtherDrive, Overlap, Pointer};
-        let image = fixture::image(false);
-        let twin = image.clone();
-        let (mut o, mut raw, table) = (made(), blank(), pair(&image, &twin));
+        let (mut o, mut raw, table) = (made(), blank(), table());
         assert_eq!(flexspline_store_init(null_mut()), Pointer);
         assert_eq!(flexspline_state_init(null_mut()), Pointer);
         let odd = (&raw mut o.state).cast::<u8>().wrapping_add(1).cast::<FlexsplineState>();
@@ -1320,10 +1314,7 @@ mod tests {
 
     #[test]
     fn each_quality_and_a_missing_sample_are_told() {
-        let image = fixture::image(false);
-        let twin = image.clone();
-        let (mut o, table) = (made(), pair(&image, &twin));
-        assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+        let (mut o, table) = active();
         let mut tick = |input: FlexsplineInput| {
             let mut out = FlexsplineOutput::default();
             let status = flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &input, &mut out);
@@ -1356,9 +1347,7 @@ mod tests {
 
     #[test]
     fn what_another_call_made_is_no_object() {
-        let (mut o, image) = (made(), fixture::image(false));
-        let twin = image.clone();
-        let table = pair(&image, &twin);
+        let (mut o, table) = (made(), table());
         let state = (&raw const o.state).cast::<FlexsplineJoint>();
         assert_eq!(flexspline_store_activate(&mut *o.store, state, &table, 20.0), FlexsplineStatus::NotInitialised);
         let joint = (&raw mut o.joint).cast::<FlexsplineState>();

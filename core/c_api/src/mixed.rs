@@ -1,6 +1,6 @@
 //! All calls next to a tick, from C and from Rust in one sequence: the same bits. And what each call refuses.
 
-use super::tests::{INPUT, LIMITS, made, pair};
+use super::tests::{INPUT, LIMITS, TABLE, active, made, table};
 use super::*;
 use FlexsplineStatus::{
     Argument, Mode as NoMode, NotInitialised, Ok as Done, OtherJoint, OtherTable, Overlap, Pointer, Saved, TooLarge,
@@ -106,10 +106,7 @@ fn predictor() -> TwoMassObserver {
 #[test]
 #[cfg_attr(miri, ignore = "takes too long")]
 fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
-    let image = fixture::image(false);
-    let twin = image.clone();
-    let (mut o, table, images) = (made(), pair(&image, &twin), Images::new(&image, &twin));
-    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), Done);
+    let ((mut o, table), images) = (active(), Images::new(&TABLE[0], &TABLE[1]));
     assert_eq!(flexspline_state_request(&mut o.state, FLEXSPLINE_MODE_TRACKING), Done);
     let joint = Joint::new(fixture::drive(), LIMITS, Overrun::FadeOut { ticks: 50 }).unwrap();
     let (mut store, mut state) = (Store::new(), JointState::new());
@@ -471,10 +468,7 @@ fn a_bit_of_a_mark_refuses_nothing() {
             assert!((spread(*one) ^ other).count_ones() >= 4, "{one:?} {other:x}");
         }
     }
-    let image = fixture::image(false);
-    let twin = image.clone();
-    let (mut o, table) = (made(), pair(&image, &twin));
-    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), Done);
+    let (mut o, table) = active();
     let mut out = FlexsplineOutput::default();
     for bit in 0..32 {
         let marks = |o: &mut super::tests::Objects| -> [*mut u32; 3] {
@@ -657,9 +651,8 @@ fn what_is_not_allowed_is_refused() {
     assert_eq!(flexspline_learner_bind(&mut learner, &nothing, &*o.store, 1), NotInitialised);
     assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, (&raw const learner).cast(), 1), Overlap);
     assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, &*o.store, 1), Argument);
-    let (image, mut o) = (fixture::image(false), o);
-    let twin = image.clone();
-    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &pair(&image, &twin), 20.0), Done);
+    let mut o = o;
+    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table(), 20.0), Done);
     let mut bound = [[0; 200]; 2];
     for (bytes, unit) in bound.iter_mut().zip([1, 2]) {
         assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, &*o.store, unit), Done);

@@ -1,4 +1,4 @@
-use super::super::tests::{INPUT, made, pair};
+use super::super::tests::{INPUT, TABLE, active, made, pair};
 use super::super::*;
 use super::*;
 use core::ptr::{null, null_mut};
@@ -12,7 +12,7 @@ fn upload() -> FlexsplineUpload {
 #[test]
 fn a_table_comes_in_chunks_and_is_activated() {
     use FlexsplineStatus::{Image, Incomplete, NotInitialised, Ok, Order, Overlap, Pointer, TooLarge};
-    let image = fixture::image(false);
+    let image = &TABLE[0];
     let (mut buffer, mut upload, mut id) = (std::vec![0u8; image.len()], upload(), [0; 8]);
     let send = |upload: &mut FlexsplineUpload, buffer: &mut Vec<u8>, offset: usize, chunk: &[u8]| {
         flexspline_upload_chunk(upload, buffer.as_mut_ptr(), buffer.len(), offset, chunk.as_ptr(), chunk.len())
@@ -31,7 +31,7 @@ fn a_table_comes_in_chunks_and_is_activated() {
     }
     assert_eq!(send(&mut upload, &mut buffer, image.len(), &[1]), TooLarge);
     assert_eq!(flexspline_upload_finish(&upload, buffer.as_ptr(), buffer.len(), &mut id), Ok);
-    assert_eq!((id, &buffer), (flexspline::Table::check(&image).unwrap().id().0, &image));
+    assert_eq!((id, &buffer), (flexspline::Table::check(image).unwrap().id().0, image));
     // The buffer is an image, for a store that had none.
     let twin = buffer.clone();
     let (mut o, table) = (made(), pair(&buffer, &twin));
@@ -50,8 +50,7 @@ fn a_table_comes_in_chunks_and_is_activated() {
 /// A table whose checksums are right, of a drive with its torque turned.
 #[test]
 fn what_no_drive_does_has_a_status_of_its_own() {
-    let image = fixture::image(false);
-    let mut turned = image.clone();
+    let mut turned = fixture::image(false);
     // D and its slope of every node, from word 136 on.
     for node in 0..33 {
         for word in [0, 1] {
@@ -67,9 +66,7 @@ fn what_no_drive_does_has_a_status_of_its_own() {
 
 #[test]
 fn events_and_records_are_those_of_rust() {
-    let image = fixture::image(false);
-    let twin = image.clone();
-    let (mut o, table) = (made(), pair(&image, &twin));
+    let (mut o, table) = active();
     let mut watch = FlexsplineWatch { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_WATCH_WORDS] };
     let (mut out, mut events) = (FlexsplineOutput::default(), FlexsplineEvents::default());
     let see = |watch: &mut FlexsplineWatch, o: &super::super::tests::Objects, out, events| {
@@ -77,7 +74,6 @@ fn events_and_records_are_those_of_rust() {
     };
     assert_eq!(see(&mut watch, &o, &out, &mut events), FlexsplineStatus::NotInitialised);
     assert_eq!(flexspline_watch_init(&mut watch), FlexsplineStatus::Ok);
-    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
     assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
     let mut reported = Vec::new();
     for (missed_ticks, torque_n_m) in [(0, 5.0), (0, f32::NAN), (2, 5.0), (0, 5.0)] {
@@ -112,10 +108,7 @@ fn events_and_records_are_those_of_rust() {
 fn what_lies_ahead_is_what_rust_says() {
     use flexspline::PlayState;
     use flexspline_estimation::{Inertias, Noise};
-    let image = fixture::image(false);
-    let twin = image.clone();
-    let (mut o, table) = (made(), pair(&image, &twin));
-    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+    let (o, _) = active();
     let inertias =
         Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3.0e4, damping_n_m_s_per_rad: 20.0 };
     let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: Some(1e-6) };
