@@ -510,8 +510,9 @@ impl Counts {
         sum
     }
 
-    /// Counts by field, poorly reported faults first.
-    fn print(&self, name: &str) {
+    /// Prints the counts by field, poorly reported faults first; none may be silent.
+    #[track_caller]
+    fn none_is_silent(&self, name: &str) {
         let all = |found: &[usize; 4]| found.iter().sum::<usize>();
         let mut fields: Vec<_> = self.0.iter().collect();
         fields.sort_by_key(|(_, found)| core::cmp::Reverse((found[3], found[2])));
@@ -530,6 +531,7 @@ impl Counts {
         }
         let [none, reported, held, silent] = self.sum();
         std::println!("{:>50} {:>8} {silent:>8} {held:>8} {reported:>8} {none:>8}", "all", all(&self.sum()));
+        assert_eq!(silent, 0, "{name}");
     }
 }
 
@@ -559,9 +561,7 @@ fn no_single_bit_of_what_lives_on_is_wrong_in_silence() {
             }
         }
     }
-    counts.print("single bits");
-    let [_, _, _, silent] = counts.sum();
-    assert_eq!(silent, 0);
+    counts.none_is_silent("single bits");
 }
 
 /// Every bit of what feeds a tick, while learning goes on: what it says afterwards is the same to the bit, as if there
@@ -641,9 +641,7 @@ fn no_single_bit_of_the_copies_is_wrong_in_silence() {
             counts.add(if copy == 0 { "first copy" } else { "second copy" }, live_on(hit, Story::Tracking, 120, &run));
         }
     }
-    counts.print("bits of the copies");
-    let [_, _, _, silent] = counts.sum();
-    assert_eq!(silent, 0);
+    counts.none_is_silent("bits of the copies");
 }
 
 /// Numbers that look random, the same in every run.
@@ -726,18 +724,12 @@ fn fed() -> Vec<(Story, &'static [usize])> {
 
 #[test]
 fn no_mixed_flips_are_wrong_in_silence() {
-    let counts = mixed(&STORIES, 6_000, 1, 100);
-    counts.print("mixed flips");
-    let [_, _, _, silent] = counts.sum();
-    assert_eq!(silent, 0);
+    mixed(&STORIES, 6_000, 1, 100).none_is_silent("mixed flips");
 }
 
 #[test]
 fn no_mixed_flips_of_what_feeds_a_tick_are_wrong_in_silence() {
-    let counts = mixed(&fed(), 20_000, 3, 250);
-    counts.print("mixed flips of what feeds");
-    let [_, _, _, silent] = counts.sum();
-    assert_eq!(silent, 0);
+    mixed(&fed(), 20_000, 3, 250).none_is_silent("mixed flips of what feeds");
 }
 
 #[test]
@@ -747,9 +739,7 @@ fn no_mixed_flips_of_a_million_are_wrong_in_silence() {
     for (kind, found) in mixed(&STORIES, 300_000, 2, 250).0 {
         counts.0.entry(kind).or_default().iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
     }
-    counts.print("mixed flips");
-    let [_, _, _, silent] = counts.sum();
-    assert_eq!(silent, 0);
+    counts.none_is_silent("mixed flips");
 }
 
 /// Saved states cut anywhere and gone on with by another: only whole ones are taken.
