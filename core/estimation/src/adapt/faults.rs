@@ -138,54 +138,16 @@ fn recovers(fault: SensorFault, left: f64) {
     }
 }
 
+/// Off, away, to and fro, late, with another gain of the load or none, standing still, of the other sign.
 #[test]
-fn a_sensor_that_was_off() {
-    for off in [5.0, 10.0, 20.0, 30.0, -30.0] {
-        recovers(SensorFault::Off(off * ARCSEC), 2.0);
-    }
-}
-
-#[test]
-fn a_sensor_that_slid_away() {
-    for rate in [0.2, 1.0, 5.0, 50.0] {
-        recovers(SensorFault::Slide(rate * ARCSEC), 15.0);
-    }
-}
-
-#[test]
-fn a_sensor_that_jumped() {
-    for (by, half) in [(5.0, 300), (20.0, 300), (20.0, 50), (20.0, 3000), (100.0, 300)] {
-        recovers(SensorFault::Jump(by * ARCSEC, half), 15.0);
-    }
-}
-
-#[test]
-fn a_sensor_that_was_frozen() {
-    recovers(SensorFault::Frozen, 15.0);
-}
-
-#[test]
-fn a_sensor_that_was_late() {
-    for ticks in [1, 5, 20] {
-        recovers(SensorFault::Late(ticks), 15.0);
-    }
-}
-
-#[test]
-fn a_sensor_of_the_other_sign() {
-    recovers(SensorFault::OtherSign, 15.0);
-}
-
-#[test]
-fn a_load_sensor_with_another_gain() {
-    for by in [1.3, 0.7, -1.0] {
-        recovers(SensorFault::Torque(by), 15.0);
-    }
-}
-
-#[test]
-fn a_load_sensor_that_was_dead() {
-    recovers(SensorFault::Torque(0.0), 15.0);
+fn a_sensor_that_was_wrong_is_recovered_from() {
+    use SensorFault::{Frozen, Jump, Late, Off, OtherSign, Slide, Torque};
+    [5.0, 10.0, 20.0, 30.0, -30.0].into_iter().for_each(|off| recovers(Off(off * ARCSEC), 2.0));
+    let slid = [0.2, 1.0, 5.0, 50.0].map(|rate| Slide(rate * ARCSEC));
+    let jumps = [(5.0, 300), (20.0, 300), (20.0, 50), (20.0, 3000), (100.0, 300)];
+    let others = [Late(1), Late(5), Late(20), Torque(1.3), Torque(0.7), Torque(-1.0), Torque(0.0), Frozen, OtherSign];
+    let jumped = jumps.map(|(by, half)| Jump(by * ARCSEC, half));
+    slid.into_iter().chain(jumped).chain(others).for_each(|fault| recovers(fault, 15.0));
 }
 
 prop_compose! {
