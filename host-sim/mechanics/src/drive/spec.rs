@@ -771,14 +771,17 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_made_in_a_program_is_checked_with_its_imperfections() {
+    fn a_drive_made_in_a_program_is_checked_as_one_of_a_file() {
         let mut drive = Drive::hhd_95();
         drive.as_built.flexspline_pitch_error_um = vec![0.0; 188];
         drive.as_built.flexspline_pitch_error_um[7] = f64::INFINITY;
         drive.as_built.cam_form_harmonics = vec![Harmonic { order: 0, amplitude_um: f64::NAN, phase_deg: 0.0 }];
+        drive.flanks.friction_coefficient = f64::NAN;
+        drive.material.poissons_ratio = 0.6;
         assert_eq!(
             drive.check().unwrap_err().to_string(),
-            "as_built.flexspline_pitch_error_um[7]: found inf, allowed: -100 to \
+            "material.poissons_ratio: found 0.6, allowed: 0 to 0.49\nflanks.friction_coefficient: found NaN, allowed: \
+             0 to 0.5\nas_built.flexspline_pitch_error_um[7]: found inf, allowed: -100 to \
              100\nas_built.cam_form_harmonics[0].order: found 0, allowed: 1 to \
              1000\nas_built.cam_form_harmonics[0].amplitude_um: found NaN, allowed: 0 to 100"
         );
@@ -798,18 +801,6 @@ mod tests {
                 assert!((a.curvature / s - b.curvature).abs() < 1e-12);
             }
         }
-    }
-
-    #[test]
-    fn a_drive_made_in_a_program_is_checked_without_a_file() {
-        let mut drive = Drive::hhd_95();
-        drive.flanks.friction_coefficient = f64::NAN;
-        drive.material.poissons_ratio = 0.6;
-        assert_eq!(
-            drive.check().unwrap_err().to_string(),
-            "material.poissons_ratio: found 0.6, allowed: 0 to 0.49\nflanks.friction_coefficient: found NaN, allowed: \
-             0 to 0.5"
-        );
     }
 
     #[test]
