@@ -55,6 +55,11 @@ impl Bench {
         Answer { status, head: head.to_lowercase(), body: body.to_owned() }
     }
 
+    /// A request without a body by a name of the host, with these headers.
+    fn by(&self, what: &str, host: &str, headers: &str) -> Answer {
+        self.raw(&format!("{what} HTTP/1.1\r\nHost: {host}\r\n{headers}Connection: close\r\n\r\n"))
+    }
+
     /// A request of the page.
     fn ask(&self, method: &str, path: &str, body: &str) -> Answer {
         let Bench { host, cookie, .. } = self;
@@ -71,9 +76,7 @@ impl Bench {
 fn the_address_lets_in_and_nothing_else_does() {
     let bench = Bench::new();
     let Bench { host, token, cookie, .. } = &bench;
-    let get = |path: &str, more: &str| {
-        bench.raw(&format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{more}Connection: close\r\n\r\n"))
-    };
+    let get = |path: &str, more: &str| bench.by(&format!("GET {path}"), host, more);
     let entered = get(&format!("/?token={token}"), "");
     assert_eq!(entered.status, 303);
     assert!(
@@ -128,14 +131,12 @@ fn a_request_by_another_name_or_of_another_page_is_refused() {
         (host, "Sec-Fetch-Site: same-site\r\n"),
     ] {
         for path in ["/", "/api/state", &format!("/?token={token}")] {
-            let request =
-                format!("GET {path} HTTP/1.1\r\nHost: {name}\r\nCookie: {cookie}\r\n{more}Connection: close\r\n\r\n");
-            assert_eq!(bench.raw(&request).status, 403, "{name} {more} {path}");
+            let answer = bench.by(&format!("GET {path}"), name, &format!("Cookie: {cookie}\r\n{more}"));
+            assert_eq!(answer.status, 403, "{name} {more} {path}");
         }
     }
     for (name, more) in [(host.replace("127.0.0.1", "localhost"), ""), (host.clone(), "Sec-Fetch-Site: none\r\n")] {
-        let request = format!("GET / HTTP/1.1\r\nHost: {name}\r\nCookie: {cookie}\r\n{more}Connection: close\r\n\r\n");
-        assert_eq!(bench.raw(&request).status, 200, "{name} {more}");
+        assert_eq!(bench.by("GET /", &name, &format!("Cookie: {cookie}\r\n{more}")).status, 200, "{name} {more}");
     }
     // What changes something says that it is of this server.
     let request = format!(
@@ -143,11 +144,8 @@ fn a_request_by_another_name_or_of_another_page_is_refused() {
          close\r\n\r\n{{}}"
     );
     assert_eq!(bench.raw(&request).status, 403);
-    let preflight = format!(
-        "OPTIONS /api/jobs HTTP/1.1\r\nHost: {host}\r\nOrigin: http://evil.example\r\nAccess-Control-Request-Method: \
-         POST\r\nConnection: close\r\n\r\n"
-    );
-    let answer = bench.raw(&preflight);
+    let preflight = "Origin: http://evil.example\r\nAccess-Control-Request-Method: POST\r\n";
+    let answer = bench.by("OPTIONS /api/jobs", host, preflight);
     assert!(answer.status == 403 && !answer.head.contains("access-control"), "{}", answer.head);
 }
 
@@ -279,7 +277,7 @@ fn many_requests_do_not_end_the_server() {
                     let answer = match k % 4 {
                         0 => bench.ask("GET", "/api/state", ""),
                         1 => bench.ask("GET", "/files/../../etc/passwd", ""),
-                        2 => bench.raw(&format!("GET / HTTP/1.1\r\nHost: x{worker}\r\nConnection: close\r\n\r\n")),
+                        2 => bench.by("GET /", &format!("x{worker}"), ""),
                         _ => bench.raw("\u{1}\u{2}garbage\r\n\r\n"),
                     };
                     let fits = match k % 4 {
