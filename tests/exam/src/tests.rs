@@ -75,37 +75,34 @@ fn none(scores: &Gathered, names: &[&str]) {
 
 #[test]
 #[ignore = "long: tests/run slow"]
-fn one_that_knows_the_truth_scores_everything() {
-    let scores = scores(|truth| Ok(perfect(truth)));
-    all(&scores, &["first_name", "first_name_strict", "exact", "exact_near", "exact_far", "found_near", "found_far"]);
-    all(&scores, &["compound_first", "compound_exact", "compound_recall", "coverage_95", "removed_half"]);
-    all(&scores, &["outside_unknown", "logger_told"]);
-    none(&scores, &["false_name", "null_named", "null_not_none", "outside_named", "logger_named", "failed"]);
-    assert!((scores.all.removed_mean - 1.0).abs() < 1e-6);
+fn scores_are_those_that_an_answer_deserves() {
+    // One that knows the truth.
+    let known = scores(|truth| Ok(perfect(truth)));
+    all(&known, &["first_name", "first_name_strict", "exact", "exact_near", "exact_far", "found_near", "found_far"]);
+    all(&known, &["compound_first", "compound_exact", "compound_recall", "coverage_95", "removed_half"]);
+    all(&known, &["outside_unknown", "logger_told"]);
+    none(&known, &["false_name", "null_named", "null_not_none", "outside_named", "logger_named", "failed"]);
+    assert!((known.all.removed_mean - 1.0).abs() < 1e-6);
     // Its names are stated as certain and are right, so one level holds all of them.
-    let [level] = scores.all.reliability.as_slice() else { panic!("{:?}", scores.all.reliability) };
+    let [level] = known.all.reliability.as_slice() else { panic!("{:?}", known.all.reliability) };
     assert_eq!(level.right.right, level.right.of);
-    assert_eq!(scores.families.keys().collect::<Vec<_>>(), ["D", "E", "G", "H", "logger"]);
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn one_that_never_names_anything_finds_and_misnames_nothing() {
-    let scores = scores(|_| Ok(answer("none", &[])));
-    none(&scores, &["first_name", "exact", "compound_exact", "outside_unknown", "logger_told", "removed_half"]);
-    none(&scores, &["null_named", "null_not_none", "outside_named", "false_name", "failed"]);
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn one_that_always_names_wear_is_right_on_wear_alone() {
-    let scores = scores(|_| Ok(answer("explained", &["wear"])));
-    all(&scores, &["null_named", "null_not_none", "outside_named", "logger_named", "logger_misled"]);
+    assert_eq!(known.families.keys().collect::<Vec<_>>(), ["D", "E", "G", "H", "logger"]);
+    // One that never names anything.
+    let silent = scores(|_| Ok(answer("none", &[])));
+    none(&silent, &["first_name", "exact", "compound_exact", "outside_unknown", "logger_told", "removed_half"]);
+    none(&silent, &["null_named", "null_not_none", "outside_named", "false_name", "failed"]);
+    // One that crashes.
+    let crashed = scores(|_| Err("crashed".to_owned()));
+    all(&crashed, &["failed"]);
+    none(&crashed, &["first_name", "compound_exact", "outside_unknown"]);
+    // One that always names wear.
+    let wear = scores(|_| Ok(answer("explained", &["wear"])));
+    all(&wear, &["null_named", "null_not_none", "outside_named", "logger_named", "logger_misled"]);
     let with = |wear: bool| TRUTHS.iter().filter(move |t| t.kind == "single" && (t.hidden[0].name == "wear") == wear);
-    let strict = scores.all.rate("first_name_strict");
+    let strict = wear.all.rate("first_name_strict");
     assert_eq!(strict, Rate { right: with(true).count(), of: with(true).count() + with(false).count() });
     let like = with(false).filter(|truth| truth.hidden[0].look_alikes.contains_key("wear")).count();
-    assert_eq!(scores.all.rate("first_name").right, strict.right + like);
+    assert_eq!(wear.all.rate("first_name").right, strict.right + like);
 }
 
 /// A delay is a skew of the reads by another name: who says it misleads nobody.
@@ -134,14 +131,6 @@ fn a_refusal_that_mends_the_file_reports_the_fault() {
         assert!(!answers(fault, 1, said), "a failed run");
         assert!(!answers(Stalls, 2, said), "a file that is to be read");
     }
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn one_that_crashes_fails_every_case() {
-    let scores = scores(|_| Err("crashed".to_owned()));
-    all(&scores, &["failed"]);
-    none(&scores, &["first_name", "compound_exact", "outside_unknown"]);
 }
 
 #[test]
