@@ -18,7 +18,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
 
 use flexspline_mechanics::contact::{
     Configuration, FlankContact, FlankLaw, FlankPair, FrictionHistory, PairContribution,
@@ -31,7 +30,7 @@ use flexspline_mechanics::mesh::{MeshLevel, WheelMesh};
 use crate::Claims;
 use crate::case::AS_IN_THE_DECK;
 use crate::dat::{at_step, tables};
-use crate::program::{Limits, run};
+use crate::program::{Limits, ccx_alone};
 
 /// Coefficients: of the typical drive, and a dry one.
 const COEFFICIENTS: [f64; 2] = [0.08, 0.2];
@@ -348,9 +347,7 @@ pub fn friction(ccx: &Path, out: &Path, claims: &mut Claims) -> Result<String, S
         std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         let (deck, held) = deck(&pressed, &drive, coefficient);
         std::fs::write(folder.join("friction.inp"), deck).map_err(|error| error.to_string())?;
-        let mut command = Command::new("nice");
-        command.args(["-n", "15"]).arg(ccx).arg("friction").current_dir(&folder).env("OMP_NUM_THREADS", "1");
-        let used = run(&mut command, &folder.join("ccx.log"), None, LIMITS)?;
+        let used = ccx_alone(ccx, &folder, "friction", LIMITS)?;
         let theirs = theirs(&folder.join("friction.dat"), &pressed, &held, coefficient)?;
         println!("== friction {coefficient} between a tooth and its space; CalculiX {:.1} s", used.cpu_s);
         let ours = pressed.ours(coefficient)?;

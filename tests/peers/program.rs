@@ -8,6 +8,8 @@ use std::time::Duration;
 
 use rustix::param::clock_ticks_per_second;
 
+use crate::dat::{Table, tables};
+
 /// How often a running child is looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -71,6 +73,21 @@ pub fn run(command: &mut Command, log: &Path, watched: Option<&Path>, limits: Li
     }
     let ended = child.wait().map_err(|error| failed(&error))?;
     if ended.success() { Ok(used) } else { Err(failed(&format!("ended with {ended}; see {}", log.display()))) }
+}
+
+/// CalculiX on the deck `job`.inp of a folder; its tables.
+pub fn calculix(ccx: &Path, folder: &Path, job: &str, limits: Limits) -> Result<(Used, Vec<Table>), String> {
+    let used = ccx_alone(ccx, folder, job, limits)?;
+    let dat = folder.join(job).with_extension("dat");
+    let text = read_to_string(&dat).map_err(|error| format!("{}: {error}", dat.display()))?;
+    Ok((used, tables(&text).map_err(|error| format!("{}: {error}", dat.display()))?))
+}
+
+/// The same, its output left unread.
+pub fn ccx_alone(ccx: &Path, folder: &Path, job: &str, limits: Limits) -> Result<Used, String> {
+    let mut command = Command::new("nice");
+    command.args(["-n", "15"]).arg(ccx).arg(job).current_dir(folder).env("OMP_NUM_THREADS", "1");
+    run(&mut command, &folder.join("ccx.log"), None, limits)
 }
 
 /// State and processor time in user mode (s) from `/proc/PID/stat`.

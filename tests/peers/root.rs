@@ -9,7 +9,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
 
 use flexspline_design::simulate::{
     MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, on_mesh, stress_by_place,
@@ -20,8 +19,8 @@ use flexspline_mechanics::mesh::{MeshLevel, WheelMesh};
 use flexspline_mechanics::stepping::{Problem, SolverSettings, State};
 
 use crate::Claims;
-use crate::dat::{at_step, tables};
-use crate::program::{Limits, run};
+use crate::dat::{Table, at_step};
+use crate::program::{Limits, calculix};
 
 /// Largest relative difference of the stress. Found: 3.0 and 2.5 %.
 const STRESS: f64 = 0.03;
@@ -56,10 +55,8 @@ pub fn fillets(ccx: &Path, out: &Path, claims: &mut Claims) -> Result<String, St
         .map_err(|error| error.to_string())?;
         let (deck, numbers) = deck(&drive, &fine, ours.tooth, &edge);
         std::fs::write(folder.join("root.inp"), deck).map_err(|error| error.to_string())?;
-        let mut command = Command::new("nice");
-        command.args(["-n", "15"]).arg(ccx).arg("root").current_dir(&folder).env("OMP_NUM_THREADS", "1");
-        let used = run(&mut command, &folder.join("ccx.log"), None, LIMITS)?;
-        let theirs = largest_in_fillet(&folder.join("root.dat"), &fine, ours.tooth, &numbers, &material)?;
+        let (used, tables) = calculix(ccx, &folder, "root", LIMITS)?;
+        let theirs = largest_in_fillet(&tables, &fine, ours.tooth, &numbers, &material)?;
         lines.push(summary(kind, torque_n_m, ours, theirs, used.cpu_s, claims));
     }
     Ok(lines.join(", "))
@@ -158,15 +155,13 @@ fn deck(drive: &Drive, mesh: &WheelMesh, tooth: usize, edge: &Edge) -> (String, 
 
 /// Largest von Mises stress (MPa) in the fillets of the cell, by the displacements of CalculiX along them.
 fn largest_in_fillet(
-    dat: &Path,
+    tables: &[Table],
     mesh: &WheelMesh,
     tooth: usize,
     numbers: &BTreeMap<u32, usize>,
     material: &PlaneStrain,
 ) -> Result<f64, String> {
-    let text = std::fs::read_to_string(dat).map_err(|error| format!("{}: {error}", dat.display()))?;
-    let tables = tables(&text)?;
-    let rows = at_step(&tables, "ALL", 1).ok_or_else(|| format!("{}: no displacements of ALL", dat.display()))?;
+    let rows = at_step(tables, "ALL", 1).ok_or("no displacements of ALL")?;
     let moved: BTreeMap<usize, [f64; 2]> = rows.iter().map(|row| (row[0] as usize, [row[1], row[2]])).collect();
     let of = |edge: &SurfaceEdge| {
         let nodes = edge.map(|(local, further)| mesh.node((tooth + further) as isize, local));

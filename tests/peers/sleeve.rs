@@ -7,8 +7,8 @@ use flexspline_mechanics::drive::Drive;
 use flexspline_mechanics::sleeve::Flexspline3d;
 
 use crate::Claims;
-use crate::dat::{at_step, tables};
-use crate::program::{Limits, run};
+use crate::dat::at_step;
+use crate::program::{Limits, calculix};
 
 /// Largest relative difference of K2 of the band, and of its tilt. Found: 0.4 and 0.03 %; solids and shells were found
 /// to agree to 1 % on bands before there was this deck.
@@ -33,12 +33,7 @@ pub fn sleeves(ccx: &Path, flexspline: &Path, out: &Path, claims: &mut Claims) -
         if !made.status.success() {
             return Err(format!("export of {name}: {}", String::from_utf8_lossy(&made.stderr)));
         }
-        let mut command = Command::new("nice");
-        command.args(["-n", "15"]).arg(ccx).arg("sleeve").current_dir(&folder).env("OMP_NUM_THREADS", "1");
-        let used = run(&mut command, &folder.join("ccx.log"), None, LIMITS)?;
-        let dat = folder.join("sleeve.dat");
-        let text = std::fs::read_to_string(&dat).map_err(|error| format!("{}: {error}", dat.display()))?;
-        let tables = tables(&text)?;
+        let (used, tables) = calculix(ccx, &folder, "sleeve", LIMITS)?;
         let row = at_step(&tables, "BAND", 1).and_then(|rows| rows.first()).ok_or("no displacement of BAND")?;
         let (w, tilt) = (row[1], row[2]);
 

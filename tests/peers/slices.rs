@@ -23,7 +23,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
 
 use flexspline_mechanics::contact::{Configuration, FlankContact, FlankLaw, FlankPair, gauss_legendre};
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Side};
@@ -33,8 +32,8 @@ use flexspline_mechanics::stepping::{Method, Problem, SolverSettings, State};
 
 use crate::Claims;
 use crate::case::{ARCSEC, AS_IN_THE_DECK};
-use crate::dat::{Table, at_step, tables};
-use crate::program::{Limits, run};
+use crate::dat::{Table, at_step};
+use crate::program::{Limits, calculix};
 
 /// Penalty of both programs, N/mm³.
 const PENALTY: f64 = 5e6;
@@ -602,12 +601,7 @@ fn found(ccx: &Path, out: &Path, case: Case) -> Result<Found, String> {
     let folder = out.join(format!("slices-{}", case.name));
     std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     std::fs::write(folder.join("slices.inp"), deck.text()).map_err(|error| error.to_string())?;
-    let mut command = Command::new("nice");
-    command.args(["-n", "15"]).arg(ccx).arg("slices").current_dir(&folder).env("OMP_NUM_THREADS", "1");
-    let used = run(&mut command, &folder.join("ccx.log"), None, LIMITS)?;
-    let dat = folder.join("slices.dat");
-    let text = std::fs::read_to_string(&dat).map_err(|error| format!("{}: {error}", dat.display()))?;
-    let tables = tables(&text).map_err(|error| format!("{}: {error}", dat.display()))?;
+    let (used, tables) = calculix(ccx, &folder, "slices", LIMITS)?;
 
     println!("== {}: {count} teeth, {} layers, CalculiX {:.1} s", case.name, case.layers, used.cpu_s);
     let width = loaded.problem.drive.flexspline.width_mm;
