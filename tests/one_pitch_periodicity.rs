@@ -44,41 +44,10 @@ fn repeats(kind: GeneratorKind, mesh: MeshLevel, torque_n_m: f64) {
 }
 
 #[test]
-fn cam_without_load() {
-    repeats(GeneratorKind::Cam, MeshLevel::Standard, 0.0);
-}
-
-#[test]
-fn double_disc_without_load() {
-    repeats(GeneratorKind::DoubleDisc, MeshLevel::Coarse, 0.0);
-}
-
-#[test]
-fn four_roller_without_load() {
-    repeats(GeneratorKind::FourRoller, MeshLevel::Coarse, 0.0);
-}
-
-#[test]
-fn two_roller_without_load() {
-    repeats(GeneratorKind::TwoRoller, MeshLevel::Standard, 0.0);
-}
-
-#[test]
-fn cam_under_load() {
-    repeats(GeneratorKind::Cam, MeshLevel::Standard, 50.0);
-}
-
-#[test]
-fn two_roller_under_load() {
-    repeats(GeneratorKind::TwoRoller, MeshLevel::Standard, 50.0);
-}
-
-#[test]
-fn double_disc_under_load() {
-    repeats(GeneratorKind::DoubleDisc, MeshLevel::Coarse, 50.0);
-}
-
-#[test]
-fn four_roller_under_load() {
-    repeats(GeneratorKind::FourRoller, MeshLevel::Coarse, 50.0);
+fn every_generator_repeats_without_load_and_under_it() {
+    use GeneratorKind::{Cam, DoubleDisc, FourRoller, TwoRoller};
+    for torque_n_m in [0.0, 50.0] {
+        [Cam, TwoRoller].into_iter().for_each(|kind| repeats(kind, MeshLevel::Standard, torque_n_m));
+        [DoubleDisc, FourRoller].into_iter().for_each(|kind| repeats(kind, MeshLevel::Coarse, torque_n_m));
+    }
 }

@@ -195,23 +195,8 @@ fn small_deflection(kind: GeneratorKind) {
 }
 
 #[test]
-fn cam_small() {
-    small_deflection(GeneratorKind::Cam);
-}
-
-#[test]
-fn double_disc_small() {
-    small_deflection(GeneratorKind::DoubleDisc);
-}
-
-#[test]
-fn four_roller_small() {
-    small_deflection(GeneratorKind::FourRoller);
-}
-
-#[test]
-fn two_roller_small() {
-    small_deflection(GeneratorKind::TwoRoller);
+fn a_small_deflection_is_that_of_the_thin_ring() {
+    GeneratorKind::ALL.into_iter().for_each(small_deflection);
 }
 
 fn design_deflection(kind: GeneratorKind) {
@@ -260,21 +245,6 @@ fn design_deflection(kind: GeneratorKind) {
 }
 
 #[test]
-fn cam_design() {
-    design_deflection(GeneratorKind::Cam);
-}
-
-#[test]
-fn double_disc_design() {
-    design_deflection(GeneratorKind::DoubleDisc);
-}
-
-#[test]
-fn four_roller_design() {
-    design_deflection(GeneratorKind::FourRoller);
-}
-
-#[test]
-fn two_roller_design() {
-    design_deflection(GeneratorKind::TwoRoller);
+fn the_deflection_of_the_design_keeps_the_length_of_the_ring() {
+    GeneratorKind::ALL.into_iter().for_each(design_deflection);
 }
