@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 
-use flexspline_tests::command::{Desk, names};
+use flexspline_tests::command::{Desk, names, samples};
 
 use crate::fxt_format::crc32;
 
@@ -14,12 +14,9 @@ use crate::fxt_format::crc32;
 #[track_caller]
 fn refused(desk: &Desk, line: &str, said: &str) -> String {
     let before = names(&desk.path("."));
-    let run = desk.line(line);
-    assert_eq!(run.code, 2, "{line}: exit code {}, said {}", run.code, run.stderr);
-    assert_eq!(run.stdout, "", "{line}");
-    assert!(run.stderr.contains(said), "{line}\n  said   {}\n  wanted {said}", run.stderr);
+    let message = desk.refused(line, said);
     assert_eq!(names(&desk.path(".")), before, "{line} left something behind");
-    run.stderr
+    message
 }
 
 /// The file keeps its content, and the message names it and what would have taken its place.
@@ -96,14 +93,7 @@ fn wrong_sample_files_are_refused() {
 #[test]
 fn wrong_table_images_are_refused() {
     let desk = Desk::new();
-    let mut text = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n".to_owned();
-    for direction in [1, -1] {
-        for k in 0..8 {
-            let psi = f64::from(k) * 0.033_421_2 / 8.0;
-            text.push_str(&format!("{psi},0,20,{direction},{}\n", psi / 95.0 - 1e-4 * f64::from(direction)));
-        }
-    }
-    desk.write("good.csv", &text);
+    desk.write("good.csv", &samples(&[0]));
     desk.line("tables --generator cam --from-samples good.csv --out good").done();
     desk.write("measured.csv", "generator_rad,output_rad\n0,0\n1,0.0105\n");
     let good = fs::read(desk.path("good/cam.fxt")).unwrap();
@@ -132,7 +122,6 @@ fn wrong_table_images_are_refused() {
         assert!(message.len() > "error: wrong/cam.fxt: ".len() + 8, "{name}: {message}");
         refused(&desk, "validate --tables wrong --out nothing", "cam.fxt");
     }
-    // Sound, but of another drive than the one given.
     // Changed, with its sums corrected: the id detects it.
     let other = damage(&|image| {
         let body = 4 * u32::from_le_bytes(image[196..200].try_into().unwrap()) as usize;

@@ -6,22 +6,12 @@
 use std::fs;
 
 use flexspline_export::bundle::libraries::TARGETS;
-use flexspline_tests::command::Desk;
+use flexspline_tests::command::{Desk, samples};
 
 /// A desk with the table `out/cam.fxt`.
 fn desk() -> Desk {
     let desk = Desk::new();
-    let mut samples = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n".to_owned();
-    for torque in [-10, 10] {
-        for direction in [1, -1] {
-            for k in 0..8 {
-                let psi = f64::from(k) * 0.033_421_2 / 8.0;
-                samples
-                    .push_str(&format!("{psi},{torque},20,{direction},{}\n", psi / 95.0 - 1e-4 * f64::from(direction)));
-            }
-        }
-    }
-    desk.write("samples.csv", &samples);
+    desk.write("samples.csv", &samples(&[-10, 10]));
     desk.line("tables --generator cam --from-samples samples.csv --no-report").done();
     desk
 }
@@ -77,9 +67,7 @@ fn a_bundle_replaces_a_bundle_and_nothing_else() {
     // Its own files and nothing else: what came since, or was changed, stays, and so does all the rest.
     let before = desk.read("made/manifest.json");
     let refused = |out: &str, said: &str| {
-        let run = bundle(out);
-        assert_eq!(run.code, 2, "{out}");
-        assert!(run.stderr.contains(said), "{out}: {}", run.stderr);
+        desk.refused(&format!("bundle --tables out --no-core --out {out}"), said);
         assert_eq!(desk.read("made/manifest.json"), before);
     };
     for (name, part) in [
@@ -114,9 +102,7 @@ fn a_bundle_replaces_a_bundle_and_nothing_else() {
     put(&desk, "mine/main.c", "int main(void);");
     for name in ["README.md", "manifest.json"] {
         put(&desk, &format!("mine/{name}"), "{}");
-        let run = bundle("mine");
-        assert_eq!(run.code, 2);
-        assert!(run.stderr.contains("has files that are no bundle"), "{}", run.stderr);
+        refused("mine", "has files that are no bundle");
     }
     assert_eq!(desk.read("mine/main.c"), "int main(void);");
     assert_eq!(desk.line("bundle --tables out --no-core").code, 2, "without --out");
@@ -148,9 +134,7 @@ fn what_is_wrong_is_said_before_anything_is_written() {
         ("--tables out --libraries libraries --target thumbv7m-none-eabi", "is no static library"),
         ("--tables out --libraries libraries --target thumbv6m-none-eabi", "has no flexspline_tick"),
     ] {
-        let run = desk.line(&format!("bundle {line} --out made"));
-        assert_eq!(run.code, 2, "{line}");
-        assert!(run.stderr.contains(said), "{line}: {}", run.stderr);
+        desk.refused(&format!("bundle {line} --out made"), said);
         assert!(!desk.path("made").exists(), "{line}");
     }
 }

@@ -201,10 +201,7 @@ fn bad_input_is_refused_with_its_place_and_leaves_nothing() {
     ];
     let before = names(&desk.path("."));
     for (line, expected) in cases {
-        let run = desk.line(line);
-        assert_eq!(run.code, 2, "{line}: {}{}", run.stdout, run.stderr);
-        assert!(run.stderr.contains(expected), "{line}: {}", run.stderr);
-        assert_eq!(run.stdout, "", "{line}");
+        desk.refused(line, expected);
         assert!(names(&desk.path("out")).is_empty(), "{line} left {:?}", names(&desk.path("out")));
     }
     assert_eq!(names(&desk.path(".")), before);
@@ -398,8 +395,7 @@ fn a_sweep_agrees_with_the_table_of_the_same_drive_and_reports_every_variant() {
         ("sweep --vary generator.w0_mm=0.5 --tolerances t.toml --draws 9", "cannot be used with"),
         ("sweep", "--vary <PATH=VALUES>"),
     ] {
-        let run = desk.line(&format!("{wrong} --out nothing"));
-        assert!(run.code == 2 && run.stderr.contains(due), "{wrong}: {}", run.stderr);
+        desk.refused(&format!("{wrong} --out nothing"), due);
         assert!(!desk.path("nothing").exists());
     }
 }

@@ -2,21 +2,7 @@
 
 use std::fs;
 
-use flexspline_tests::command::{Desk, Output, names};
-
-/// Samples that make a table without FEM.
-fn samples() -> String {
-    let mut text = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n".to_owned();
-    for torque in [-10, 10] {
-        for direction in [1, -1] {
-            for k in 0..8 {
-                let psi = f64::from(k) * 0.033_421_2 / 8.0;
-                text.push_str(&format!("{psi},{torque},20,{direction},{}\n", psi / 95.0 - 1e-4 * f64::from(direction)));
-            }
-        }
-    }
-    text
-}
+use flexspline_tests::command::{Desk, Output, names, samples};
 
 /// The commands that a result says to type next.
 fn next(run: &Output) -> Vec<&str> {
@@ -72,9 +58,7 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
         ("new x.toml --set flanks.friction_coefficent=0.1", "did you mean `flanks.friction_coefficient`?"),
         ("new", "FILE"),
     ] {
-        let run = desk.line(line);
-        assert_eq!(run.code, 2, "{line}");
-        assert!(run.stderr.contains(said), "{line}: {}", run.stderr);
+        desk.refused(line, said);
     }
     let pair = |name: &str| [format!("{name}.svg"), format!("{name}.toml")];
     assert_eq!(names(&desk.path(".")), ["a", "b", "c", "d", "mine"].map(pair).concat());
@@ -163,9 +147,7 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         ("--teeth 200 --module 0.32 --bore 66", "--bore: found 66: the root circle has the diameter 65.12"),
         ("--teeth 200 --module 0.32 --drive HHD-95-typical", "--drive: found it beside --teeth"),
     ] {
-        let run = desk.line(&format!("new other.toml {line}"));
-        assert_eq!(run.code, 2, "{line}");
-        assert!(run.stderr.contains(said), "{line}: {}", run.stderr);
+        desk.refused(&format!("new other.toml {line}"), said);
     }
     assert!(!desk.path("other.toml").exists());
 }
@@ -204,7 +186,7 @@ fn commands(desk: &Desk) -> Vec<String> {
 fn every_command_prints_one_json_object_and_nothing_else() {
     let desk = Desk::new();
     desk.write("path.csv", "generator_rad\n0\n");
-    desk.write("samples.csv", &samples());
+    desk.write("samples.csv", &samples(&[-10, 10]));
     desk.write("measured.csv", "generator_rad,output_rad\n0,0\n1,0.0105\n2,0.021\n");
     desk.write("tolerances.toml", include_str!("../examples/sweep/teeth.toml"));
     let lines = [

@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use flexspline_tests::command::{Desk, Output, flexspline, names};
+use flexspline_tests::command::{Desk, Output, flexspline, names, samples};
 
 /// Every file below a folder, hidden ones too, with its content; folders end in a slash.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -102,14 +102,7 @@ fn stopped_tables_kernels_and_validations_leave_the_folder_as_it_was() {
     stopped(&desk, "tables --generator cam --mesh fine --out new/folder", WORKING, &["-TERM"]);
     stopped(&desk, "tables --kernels --generator cam", WORKING, &["-INT"]);
     stopped(&desk, "synthesize --effect wear", WORKING, &["-INT"]);
-    let mut samples = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n".to_owned();
-    for direction in [1, -1] {
-        for k in 0..8 {
-            let psi = f64::from(k) * 0.033_421_2 / 8.0;
-            samples.push_str(&format!("{psi},0,20,{direction},{}\n", psi / 95.0 - 1e-4 * f64::from(direction)));
-        }
-    }
-    desk.write("samples.csv", &samples);
+    desk.write("samples.csv", &samples(&[0]));
     desk.line("tables --generator cam --from-samples samples.csv --no-report").done();
     stopped(&desk, "validate --tables out", WORKING, &["-INT"]);
 }

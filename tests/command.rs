@@ -79,6 +79,27 @@ impl Desk {
     pub fn line(&self, line: &str) -> Output {
         self.run(&line.split_whitespace().collect::<Vec<_>>())
     }
+
+    /// Runs a line that must be refused with these words; the whole message.
+    #[track_caller]
+    pub fn refused(&self, line: &str, said: &str) -> String {
+        let run = self.line(line);
+        assert_eq!((run.code, run.stdout.as_str()), (2, ""), "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(said), "{line}\n  said   {}\n  wanted {said}", run.stderr);
+        run.stderr
+    }
+}
+
+/// Samples of a pitch under these loads, there and back, that make a table without FEM.
+pub fn samples(torques_n_m: &[i32]) -> String {
+    let mut text = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n".to_owned();
+    for (torque, direction) in torques_n_m.iter().flat_map(|torque| [(torque, 1), (torque, -1)]) {
+        for k in 0..8 {
+            let psi = f64::from(k) * 0.033_421_2 / 8.0;
+            text += &format!("{psi},{torque},20,{direction},{}\n", psi / 95.0 - 1e-4 * f64::from(direction));
+        }
+    }
+    text
 }
 
 /// Everything in a folder, hidden files too, in order.

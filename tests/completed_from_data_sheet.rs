@@ -146,18 +146,14 @@ fn a_drive_like_a_catalogues_is_right_to_the_scatter_of_the_catalogue() {
     let checked = desk.line(&format!("{check} --temperatures 1 --out checked --json")).done().json();
     println!("against fresh FEM and the spring: {} arcsec rms", checked["tables"][0]["rms_arcsec"]);
     std::fs::remove_file(desk.path("completed/cam.json")).unwrap();
-    let refused = desk.line(&check);
-    assert_eq!(refused.code, 2);
-    assert!(refused.stderr.contains("a data sheet completed this table"), "{}", refused.stderr);
+    desk.refused(&check, "a data sheet completed this table");
 
     // Two rollers are softer than the sheet's cam: no table, and no scatter of units in its place.
-    let refused = desk.line(&format!("tables {} {sheet} --out soft", how.replace("cam", "two-roller")));
-    assert!(refused.code == 2 && refused.stderr.contains("and the FEM has"), "{}", refused.stderr);
+    desk.refused(&format!("tables {} {sheet} --out soft", how.replace("cam", "two-roller")), "and the FEM has");
     assert!(!desk.path("soft/two-roller.fxt").exists());
 
     // A sheet without K3 completes nothing, and says what it lacks.
     desk.write("short.toml", &alone.replace("k3_n_m_per_rad", "# k3_n_m_per_rad"));
-    let refused = desk.line(&format!("tables {how} --drive short.toml --complete-from-data-sheet"));
-    assert_eq!(refused.code, 2);
-    assert!(refused.stderr.contains("data_sheet: found no k3_n_m_per_rad"), "{}", refused.stderr);
+    let line = format!("tables {how} --drive short.toml --complete-from-data-sheet");
+    desk.refused(&line, "data_sheet: found no k3_n_m_per_rad");
 }

@@ -1,11 +1,9 @@
 //! A joint with mass: what the core gains in flights on units that the nominal table does not know. The plant itself,
 //! the servo's ringing and the map of stable loops are claimed in `host-sim/motion/tests`.
 
-use std::process::Command;
-
 use flexspline_fly::fly::{Flown, Results, SCENARIOS, built_in, read, results};
 use flexspline_mechanics::drive::GeneratorKind;
-use flexspline_tests::command::flexspline;
+use flexspline_tests::command::Desk;
 use serde_json::Value;
 
 fn flight(flown: &Flown) -> Results {
@@ -136,18 +134,12 @@ fn the_bound_of_the_torque_by_the_motors_current_holds() {
 /// where the loop is drawn with its margins; one that is sound is not.
 #[test]
 fn a_servo_near_the_edge_of_instability_is_cautioned() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
+    let desk = Desk::new();
     let fly = |servo: &str| {
-        let file = folder.path().join("servo.toml");
-        let legs = "legs = [[2.0, 0.0], [1.5, 0.02]]";
-        std::fs::write(&file, format!("base = \"antenna\"\n{legs}\n[servo]\n{servo}\n")).unwrap();
-        let args = ["fly", file.to_str().unwrap(), "--out", out.to_str().unwrap()];
-        let done = Command::new(flexspline()).args(args).output().unwrap();
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        let results: Value = serde_json::from_slice(&std::fs::read(out.join("flight.json")).unwrap()).unwrap();
-        let page = std::fs::read_to_string(out.join("report.html")).unwrap();
-        (String::from_utf8_lossy(&done.stdout).to_string(), results, page)
+        desk.write("servo.toml", &format!("base = \"antenna\"\nlegs = [[2.0, 0.0], [1.5, 0.02]]\n[servo]\n{servo}\n"));
+        let said = desk.line("fly servo.toml").done().stdout;
+        let results: Value = serde_json::from_str(&desk.read("out/flight.json")).unwrap();
+        (said, results, desk.read("out/report.html"))
     };
     let (said, results, page) = fly("position_hz = 6.0");
     println!("{said}");
@@ -172,15 +164,10 @@ fn a_servo_near_the_edge_of_instability_is_cautioned() {
 #[test]
 #[ignore = "long: tests/run slow"]
 fn the_paces_that_are_advised_are_sound_when_followed() {
-    let folder = tempfile::tempdir().unwrap();
-    let fly = |text: &str, more: &[&str]| {
-        let file = folder.path().join("servo.toml");
-        std::fs::write(&file, format!("base = \"camera\"\nlegs = [[2.0, 0.0], [1.5, 0.02]]\n{text}")).unwrap();
-        let out = folder.path().to_str().unwrap();
-        let args = [&["fly", file.to_str().unwrap(), "--no-report", "--out", out], more].concat();
-        let done = Command::new(flexspline()).args(args).output().unwrap();
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        String::from_utf8(done.stdout).unwrap()
+    let desk = Desk::new();
+    let fly = |text: &str| {
+        desk.write("servo.toml", &format!("base = \"camera\"\nlegs = [[2.0, 0.0], [1.5, 0.02]]\n{text}"));
+        desk.line("fly servo.toml --no-report").done().stdout
     };
     let paces = |said: &str| -> Option<String> {
         let advice = said.split("with servo.").nth(1)?.split(" it is sound").next()?;
@@ -195,18 +182,18 @@ fn the_paces_that_are_advised_are_sound_when_followed() {
         (0.3, "speed_hz = 200.0\nlate_steps = 5"),
     ] {
         let scenario = |settings: &str| format!("load_kg_m2 = {load_kg_m2:?}\n[servo]\n{settings}\n");
-        let said = fly(&scenario(settings), &[]);
+        let said = fly(&scenario(settings));
         println!("{load_kg_m2} {settings}: {said}");
         let stable = !said.contains("The servo itself is not stable");
         assert!(said.contains("caution: The servo") && (stable || !said.contains("Compensation makes")), "{said}");
         let advice = paces(&said).expect("some paces are sound");
         let names: Vec<&str> = advice.lines().filter_map(|line| line.split(' ').next()).collect();
         let others = settings.lines().filter(|line| !names.iter().any(|name| line.starts_with(name)));
-        let followed = fly(&scenario(&others.chain(advice.lines()).collect::<Vec<_>>().join("\n")), &[]);
+        let followed = fly(&scenario(&others.chain(advice.lines()).collect::<Vec<_>>().join("\n")));
         println!("{followed}");
         assert!(!followed.contains("caution: The servo"), "{load_kg_m2} {settings}, then {advice}: {followed}");
     }
-    let said = fly("load_kg_m2 = 1000.0\nacceleration_rad_s2 = 0.1\n", &[]);
+    let said = fly("load_kg_m2 = 1000.0\nacceleration_rad_s2 = 0.1\n");
     assert!(paces(&said).is_none() && said.contains("(1000 of ") && said.contains("motor held"), "{said}");
 }
 
@@ -214,19 +201,12 @@ fn the_paces_that_are_advised_are_sound_when_followed() {
 /// made; and what the core has is the file itself.
 #[test]
 fn the_drive_of_an_own_table_flies_as_its_contact_fem_does() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = |line: &str| {
-        let done = Command::new(flexspline()).args(line.split(' ')).current_dir(folder.path()).output().unwrap();
-        assert!(done.status.success(), "{line}: {}", String::from_utf8_lossy(&done.stderr));
-        String::from_utf8(done.stdout).unwrap()
-    };
+    let desk = Desk::new();
     let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/firmware/samples/cam.samples.csv");
-    run(&format!("tables -q --no-report --generator cam --from-samples {samples} --out ."));
-    let example = run("fly camera --example");
-    std::fs::write(folder.path().join("own.toml"), example.replace("\"calibrated\"", "\"nominal\"")).unwrap();
-    let flown = |more: &str| -> Value {
-        serde_json::from_str(&run(&format!("fly own.toml --json --no-report --out flown{more}"))).unwrap()
-    };
+    desk.line(&format!("tables -q --no-report --generator cam --from-samples {samples} --out .")).done();
+    let example = desk.line("fly camera --example").done().stdout;
+    desk.write("own.toml", &example.replace("\"calibrated\"", "\"nominal\""));
+    let flown = |more: &str| desk.line(&format!("fly own.toml --json --no-report --out flown{more}")).done().json();
     let (own, known) = (flown(" --tables cam.fxt"), flown(""));
     let rms = |flight: &Value, controller: &str| flight["rms_arcsec"][controller].as_f64().unwrap();
     for controller in ["none", "compensated", "ideal"] {
@@ -239,40 +219,23 @@ fn the_drive_of_an_own_table_flies_as_its_contact_fem_does() {
     assert_eq!((&own["generator"], &own["table"]), (&"cam".into(), &"nominal".into()));
     assert_ne!(own["digest"], known["digest"]);
     // A value that does not fit the table is reported.
-    let refused = |line: &str| {
-        let done = Command::new(flexspline()).args(line.split(' ')).current_dir(folder.path()).output().unwrap();
-        assert_eq!(done.status.code(), Some(2), "{line}");
-        String::from_utf8(done.stderr).unwrap()
-    };
-    std::fs::write(
-        folder.path().join("heavy.toml"),
-        "base = \"camera\"\n[load]\nbias_n_m = 200.0\nswing = [200.0, 0.1]\nstep = [200.0, 3.0]\n",
-    )
-    .unwrap();
-    let said = refused("fly heavy.toml --tables cam.fxt");
-    assert!(said.contains("N·m with this table"), "{said}");
-    let said = refused("fly camera --tables own.toml");
-    assert!(said.contains("own.toml: "), "{said}");
+    let heavy = "base = \"camera\"\n[load]\nbias_n_m = 200.0\nswing = [200.0, 0.1]\nstep = [200.0, 3.0]\n";
+    desk.write("heavy.toml", heavy);
+    desk.refused("fly heavy.toml --tables cam.fxt", "N·m with this table");
+    desk.refused("fly camera --tables own.toml", "own.toml: ");
 }
 
 #[test]
 fn the_command_prints_what_was_promised_and_names_a_scenario_that_is_not_there() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("short.toml");
-    std::fs::write(&file, "base = \"camera\"\nlegs = [[2.0, 0.0], [1.5, 0.02]]\n").unwrap();
-    let out = folder.path().join("out");
-    let args = ["fly", file.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()];
-    let done = Command::new(flexspline()).args(args).output().unwrap();
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let json: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let desk = Desk::new();
+    desk.write("short.toml", "base = \"camera\"\nlegs = [[2.0, 0.0], [1.5, 0.02]]\n");
+    let json = desk.line("fly short.toml --json").done().json();
     for key in ["rms_arcsec", "max_arcsec", "velocity_ripple"] {
         for controller in ["none", "fourier", "fourier_by_direction", "compensated"] {
             assert!(json[key][controller].is_f64(), "{key} {controller}");
         }
     }
-    assert!(json["stable"].is_boolean() && out.join("report.html").is_file() && out.join("flight.json").is_file());
-    let wrong = Command::new(flexspline()).args(["fly", "anntena"]).output().unwrap();
-    assert_eq!(wrong.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&wrong.stderr).to_string();
-    assert!(said.contains("did you mean `antenna`?"), "{said}");
+    assert!(json["stable"].is_boolean());
+    assert!(["report.html", "flight.json"].iter().all(|file| desk.path(&format!("out/{file}")).is_file()));
+    desk.refused("fly anntena", "did you mean `antenna`?");
 }

@@ -64,8 +64,7 @@ fn sweep_shards_killed_and_resumed_have_the_bytes_of_one_run() {
         "sweep plan --tolerances teeth.toml --draws 1000 --out bench",
         "sweep --vary flexspline.rim_thickness_mm=1.4,1.5 --out bench",
     ] {
-        let run = desk.line(line);
-        assert!(run.code == 2 && run.stderr.contains("plan.csv, a plan of another command"), "{line}: {}", run.stderr);
+        desk.refused(line, "plan.csv, a plan of another command");
     }
     assert_eq!(["one/plan.csv", "bench/plan.csv"].map(|file| desk.read(file)), plans);
 }
@@ -100,11 +99,6 @@ fn a_sweep_of_a_field_finds_the_known_optimum() {
     let less = "sweep reduce out --least peak_generator_pressure_mpa --json";
     assert_eq!(desk.line(less).done().json()["generators"][0]["front"], serde_json::json!([1]));
     for former in ["study --vary generator.w0_mm=0.5", "campaign plan t.toml"] {
-        let run = desk.line(former);
-        assert!(
-            run.code == 2 && run.stderr.contains("flexspline sweep") && run.stderr.lines().count() == 1,
-            "{}",
-            run.stderr
-        );
+        assert_eq!(desk.refused(former, "flexspline sweep").lines().count(), 1, "{former}");
     }
 }

@@ -7,28 +7,25 @@ use flexspline_identify::causes::CauseName;
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
-/// A drive known from its catalogue.
-const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad \
-                       = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = \
-                       1.5\n[[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad \
-                       = 0.4\n";
+use crate::synthesize_and_extend::nominal_desk;
+
 const HIDDEN: &str = "circular_spline_eccentricity";
 
 fn steps<'d>(diagnosis: &'d Value, cause: &str) -> Vec<&'d Value> {
     diagnosis["trace"].as_array().unwrap().iter().filter(|step| step["cause"] == cause).collect()
 }
 
-/// Measurements that hide [`HIDDEN`].
-fn measured(desk: &Desk) {
-    desk.write("nominal.toml", NOMINAL);
+/// A desk with measurements that hide [`HIDDEN`].
+fn measured() -> Desk {
+    let desk = nominal_desk();
     desk.line(&format!("synthesize --model nominal.toml --effect {HIDDEN}:amplitude_um=10 --seed 42 --out made"))
         .done();
+    desk
 }
 
 #[test]
 fn the_trace_names_the_gate_that_dropped_a_rival() {
-    let desk = Desk::new();
-    measured(&desk);
+    let desk = measured();
     let diagnosis = desk.line("diagnose made/data.csv --model nominal.toml --no-report --json").done().json();
     assert_eq!(diagnosis["causes"][0]["name"], HIDDEN, "{}", diagnosis["causes"]);
 
@@ -57,8 +54,7 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
 #[test]
 fn a_cracked_root_is_named_and_the_damaged_tooth_that_contains_it_is_not() {
     const CRACK: &str = "cracked_tooth_root";
-    let desk = Desk::new();
-    desk.write("nominal.toml", NOMINAL);
+    let desk = nominal_desk();
     let truth = desk
         .line(&format!(
             "synthesize --model nominal.toml --effect {CRACK}:amplitude_arcsec=30,angle_rad=0.9 --seed 24 --out made \
@@ -99,8 +95,7 @@ fn a_cracked_root_is_named_and_the_damaged_tooth_that_contains_it_is_not() {
 #[test]
 #[ignore = "long: tests/run slow"]
 fn a_cause_is_explained_on_one_screen() {
-    let desk = Desk::new();
-    measured(&desk);
+    let desk = measured();
     let explained = |cause: &str| {
         let line = format!("diagnose made/data.csv --model nominal.toml --no-report --explain {cause}");
         desk.line(&line).done().stdout
@@ -126,7 +121,5 @@ fn a_cause_is_explained_on_one_screen() {
     let blind = explained("stiffness_hardening");
     assert!(blind.contains("torque") && !blind.contains("asked for"), "{blind}");
 
-    let refused = desk.line("diagnose made/data.csv --model nominal.toml --explain weer");
-    assert_eq!(refused.code, 2);
-    assert!(refused.stderr.contains("did you mean `wear`"), "{}", refused.stderr);
+    desk.refused("diagnose made/data.csv --model nominal.toml --explain weer", "did you mean `wear`");
 }
