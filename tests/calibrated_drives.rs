@@ -18,6 +18,7 @@
 use std::f64::consts::{PI, TAU};
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Table};
+use flexspline_base::statistics::std_dev;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
 use flexspline_fly::plant_map::{GearMap, WindUp};
@@ -301,12 +302,6 @@ fn another_day(random: &mut fastrand::Rng) -> Run {
     run
 }
 
-/// Root mean square about the mean.
-fn about(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
-}
-
 /// A table of waves as any program fits them: orders of the generator and of the output, if wanted for each direction
 /// alone.
 struct Fourier {
@@ -365,7 +360,7 @@ impl Best {
 }
 
 /// Coefficients of rows with the least squares; a column that says nothing gets none.
-fn least_squares(rows: impl Iterator<Item = (Vec<f64>, f64)>) -> Vec<f64> {
+pub fn least_squares(rows: impl Iterator<Item = (Vec<f64>, f64)>) -> Vec<f64> {
     let mut system: Vec<Vec<f64>> = Vec::new();
     for (x, value) in rows {
         let width = x.len();
@@ -480,7 +475,7 @@ fn of_drive(seed: u64) -> Figures {
         })
         .collect();
     let over = |left: &dyn Fn(&Run) -> Vec<f64>| {
-        (days.iter().map(|day| about(&left(day)).powi(2)).sum::<f64>() / days.len() as f64).sqrt()
+        (days.iter().map(|day| std_dev(&left(day)).powi(2)).sum::<f64>() / days.len() as f64).sqrt()
     };
     let by_waves = |by_direction: bool| {
         let fitted = Fourier::of(&rows, by_direction);

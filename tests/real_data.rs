@@ -2,9 +2,10 @@
 //! hand.
 
 use std::f64::consts::TAU;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexspline_base::robust::white_noise;
+use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::measurement::{ColumnMap, Gear, Session, bytes_of, parse};
 use flexspline_identify::nominal::Nominal;
@@ -12,15 +13,23 @@ use flexspline_identify::residual::{Axis, Picture, harmonics};
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
-const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
+use crate::calibrated_drives::least_squares;
+use crate::calibration::{CSF17, CSF17_COLUMNS};
+
+const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");
 
 fn csf17() -> Session {
-    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../examples/csf17_100/error_vs_input.csv");
-    let map = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec").unwrap();
-    let mut recording = parse("gear.csv", bytes_of(&file).unwrap().1, &map, &Gear::of_teeth(200, 202, true)).unwrap();
+    let map = ColumnMap::parse(CSF17_COLUMNS).unwrap();
+    let bytes = bytes_of(Path::new(CSF17)).unwrap().1;
+    let mut recording = parse("gear.csv", bytes, &map, &Gear::of_teeth(200, 202, true)).unwrap();
     assert_eq!(recording.faults, [], "a clean measurement");
     assert_eq!((recording.rows, recording.sessions.len()), (431, 1));
     recording.sessions.remove(0)
+}
+
+/// What its catalogue says of it.
+fn nominal() -> Nominal {
+    Nominal::from_toml("nominal.toml", include_str!("../examples/csf17_100/nominal.toml")).unwrap()
 }
 
 fn arcsec(session: &Session) -> Vec<f64> {
@@ -52,9 +61,7 @@ fn the_csf17_has_its_orders() {
     let (constant, lines) = harmonics(&session.generator_rad, &error, &[2.0]).unwrap();
     assert!((left(&lines, constant) - 6.09).abs() < 0.01, "{}", left(&lines, constant));
     // Without given orders: two waves a turn, and that the wheels are not distinguishable in 2.5 turns.
-    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");
-    let model = std::fs::read_to_string(format!("{example}/nominal.toml")).unwrap();
-    let nominal = Nominal::from_toml("nominal.toml", &model).unwrap();
+    let nominal = nominal();
     let picture = Picture::of(&Rows::new(&[session], &nominal), &error, nominal.ratio).unwrap();
     let spectrum = &picture.spectra[0];
     assert_eq!(spectrum.axis, Axis::Generator);
@@ -95,7 +102,7 @@ fn the_csf17_held_out() {
             orders.iter().for_each(|order| row.extend([(order * psi[k]).sin(), (order * psi[k]).cos()]));
             row
         };
-        let fitted = least_squares(&(0..half).map(|k| (row(k), error[k])).collect::<Vec<_>>());
+        let fitted = least_squares((0..half).map(|k| (row(k), error[k])));
         rms((half..psi.len()).map(|k| error[k] - row(k).iter().zip(&fitted).map(|(a, b)| a * b).sum::<f64>()))
     };
     for degree in [0, 1, 2] {
@@ -106,29 +113,6 @@ fn the_csf17_held_out() {
         );
     }
     assert!((strict(&[2.0], 0) - two).abs() < 1e-6, "the same as above, by another way");
-}
-
-/// Least squares by Gauss elimination of the normal equations.
-fn least_squares(rows: &[(Vec<f64>, f64)]) -> Vec<f64> {
-    let n = rows[0].0.len();
-    let mut m = vec![vec![0.0; n + 1]; n];
-    for (row, y) in rows {
-        for i in 0..n {
-            (0..n).for_each(|j| m[i][j] += row[i] * row[j]);
-            m[i][n] += row[i] * y;
-        }
-    }
-    for i in 0..n {
-        let pivot = (i..n).max_by(|a, b| m[*a][i].abs().total_cmp(&m[*b][i].abs())).unwrap();
-        m.swap(i, pivot);
-        for k in 0..n {
-            if k != i {
-                let by = m[k][i] / m[i][i];
-                (i..=n).for_each(|j| m[k][j] -= by * m[i][j]);
-            }
-        }
-    }
-    (0..n).map(|i| m[i][n] / m[i][i]).collect()
 }
 
 /// The `diagnosis.json` that `flexspline diagnose` makes of data.
@@ -147,9 +131,7 @@ fn names(json: &Value) -> Vec<&str> {
 /// what 2.5 turns in one direction cannot show.
 #[test]
 fn the_csf17_has_more_than_two_waves_and_nothing_is_invented_for_the_rest() {
-    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");
-    let model = std::fs::read_to_string(format!("{example}/nominal.toml")).unwrap();
-    let nominal = Nominal::from_toml("nominal.toml", &model).unwrap();
+    let nominal = nominal();
     let mut session = csf17();
     for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
         *error -= nominal.harmonics_arcsec(*psi) / ARCSEC_PER_RAD;
@@ -167,9 +149,7 @@ fn the_csf17_has_more_than_two_waves_and_nothing_is_invented_for_the_rest() {
     assert!((around(1.0) - 3.9).abs() < 1.0 && (around(4.0) - 4.1).abs() < 1.0 && around(12.0) < 1.0);
 
     let desk = Desk::new();
-    let map = "time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec";
-    let json =
-        diagnosed(&desk, &format!("{example}/error_vs_input.csv --model {example}/nominal.toml --columns {map}"));
+    let json = diagnosed(&desk, &format!("{CSF17} --model {EXAMPLE}/nominal.toml --columns {CSF17_COLUMNS}"));
     assert_eq!(json["data_faults"].as_array().unwrap().len(), 0);
     let verdict = json["verdict"].as_str().unwrap();
     assert!(["partly_explained", "unknown"].contains(&verdict), "4.6 of 6.1 arcsec stay unexplained: {verdict}");
@@ -215,11 +195,8 @@ fn held_by(page: &str, begins: &str, said: &str) {
 
 #[test]
 fn the_page_of_the_csf17_says_what_the_program_says() {
-    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");
-    let page = std::fs::read_to_string(format!("{example}/README.md")).unwrap();
-    let map = "time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec";
-    let line =
-        format!("diagnose {example}/error_vs_input.csv --model {example}/nominal.toml --no-report --columns {map}");
+    let page = std::fs::read_to_string(format!("{EXAMPLE}/README.md")).unwrap();
+    let line = format!("diagnose {CSF17} --model {EXAMPLE}/nominal.toml --no-report --columns {CSF17_COLUMNS}");
     held_by(&page, "finding:", &Desk::new().line(&line).done().stdout);
 }
 
