@@ -182,23 +182,6 @@ mod tests {
     use flexspline_mechanics::mesh::MeshLevel;
     use flexspline_mechanics::stepping::SolverSettings;
 
-    #[test]
-    fn base64_is_that_of_the_standard() {
-        // RFC 4648, section 10
-        for (plain, coded) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foob", "Zm9vYg=="),
-            ("fooba", "Zm9vYmE="),
-            ("foobar", "Zm9vYmFy"),
-        ] {
-            assert_eq!(base64(plain.as_bytes()), coded.as_bytes());
-        }
-        assert_eq!(base64(&[0xfb, 0xff, 0xfe]), b"+//+");
-    }
-
     fn unbase64(text: &str) -> Vec<u8> {
         let value = |b: u8| match b {
             b'A'..=b'Z' => b - b'A',
@@ -208,6 +191,7 @@ mod tests {
             b'/' => 63,
             _ => panic!("not a digit: {b}"),
         };
+        assert_eq!(text.trim().len() % 4, 0, "padded");
         let digits: Vec<u8> = text.trim().trim_end_matches('=').bytes().map(value).collect();
         let mut bytes = Vec::new();
         for chunk in digits.chunks(4) {
