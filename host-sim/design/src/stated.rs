@@ -562,6 +562,18 @@ mod tests {
         SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
     }
 
+    /// A sheet beside figures of a drive.
+    fn shown(stated: Stated, beside: Vec<Beside>) -> SheetBeside {
+        let (generator, loads, assumed) = (GeneratorKind::Cam, stated.loads(20.0), stated.assumed());
+        SheetBeside { generator, stated, loads, assumed, sheet: DataSheet::default(), beside, why: None }
+    }
+
+    /// A stiffness that is stated, and computed over it.
+    fn row(figure: &'static str, stated: f64, ratio: Option<f64>) -> Beside {
+        let within_scatter = ratio.map(|ratio| (ratio - 1.0).abs() <= 0.3);
+        Beside { figure, stated, computed: ratio.map(|of| stated * of), ratio, within_scatter, words: "secant" }
+    }
+
     #[test]
     fn a_sheet_is_read_and_every_mistake_has_its_line() {
         let read = |body: &str| Stated::of_file("d.toml", &format!("base = \"HHD-95\"\n[data_sheet]\n{body}\n"));
@@ -625,27 +637,11 @@ mod tests {
                 assert!(kept(stated.rated_torque_n_m, loads.largest_n_m), "{given}: {loads:?}");
                 assert!(0.0 < loads.t1_n_m && loads.t1_n_m < loads.t2_n_m, "{given}: {loads:?}");
                 assert!(loads.t2_n_m < loads.largest_n_m, "{given}: {loads:?}");
-                let assumed = stated.assumed();
-                assert_eq!(assumed.len(), 3 - (given as u32).count_ones() as usize);
-                let sheet = SheetBeside {
-                    generator: GeneratorKind::Cam,
-                    stated,
-                    loads,
-                    assumed,
-                    sheet: DataSheet::default(),
-                    beside: Vec::new(),
-                    why: None,
-                };
+                let sheet = shown(stated, Vec::new());
+                assert_eq!(sheet.assumed.len(), 3 - (given as u32).count_ones() as usize);
                 assert_eq!(sheet.text().matches("(assumed)").count(), sheet.assumed.len(), "{}", sheet.text());
                 assert_eq!(sheet.assumed_in_words().is_some(), given < 7);
-                let k1 = Beside {
-                    figure: "k1_n_m_per_rad",
-                    stated: 1e4,
-                    computed: None,
-                    ratio: None,
-                    within_scatter: None,
-                    words: "secant",
-                };
+                let k1 = row("k1_n_m_per_rad", 1e4, None);
                 assert_eq!(k1.remark(&sheet).contains("at assumed loads"), given & 1 == 0);
             }
         }
@@ -654,19 +650,10 @@ mod tests {
     /// A drive 7.7 times as stiff as its sheet is no good page; one within what units scatter is.
     #[test]
     fn stiffness_beyond_what_units_scatter_is_a_caution() {
-        let row = |figure, ratio: f64| Beside {
-            figure,
-            stated: 1e4,
-            computed: Some(1e4 * ratio),
-            ratio: Some(ratio),
-            within_scatter: Some((ratio - 1.0).abs() <= 0.3),
-            words: "secant",
-        };
         let caution = |k1: f64, k2: f64| {
             let stated = Stated { unit_scatter_percent: Some(30.0), ..Stated::default() };
-            let (loads, assumed, sheet) = (stated.loads(20.0), stated.assumed(), DataSheet::default());
-            let beside = vec![row("k1_n_m_per_rad", k1), row("k2_n_m_per_rad", k2)];
-            SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None }.caution()
+            let rows = [("k1_n_m_per_rad", k1), ("k2_n_m_per_rad", k2)];
+            shown(stated, rows.map(|(figure, ratio)| row(figure, 1e4, Some(ratio))).to_vec()).caution()
         };
         assert_eq!(caution(1.2, 0.8), None);
         let stiff = caution(7.7, 1.2).unwrap();
@@ -685,10 +672,7 @@ mod tests {
         let loads = stated.loads(20.0);
         assert_eq!((loads.t1_n_m, loads.t2_n_m, loads.largest_n_m.round()), (29.0, 108.0, 150.0));
         assert_eq!(stated.assumed(), ["rated_torque_n_m"]);
-        let assumed = stated.assumed();
-        let sheet = DataSheet::default();
-        let shown =
-            SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside: Vec::new(), why: None };
+        let shown = shown(stated, Vec::new());
         let text = shown.text();
         assert!(
             text.contains("T2 108 largest 150 (assumed) N·m")
@@ -707,18 +691,8 @@ mod tests {
     #[test]
     fn columns_stand_apart_whatever_the_ratio() {
         let stated = Stated { k1_n_m_per_rad: Some(3.1), ..Stated::default() };
-        let (loads, assumed, sheet) = (stated.loads(20.0), stated.assumed(), DataSheet::default());
-        let row = |ratio: f64| Beside {
-            figure: "k1_n_m_per_rad",
-            stated: 3.1,
-            computed: Some(3.1 * ratio),
-            ratio: Some(ratio),
-            within_scatter: None,
-            words: "secant",
-        };
-        let beside = vec![row(244_747.3), row(2.447e11), row(0.98)];
-        let shown = SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None };
-        let text = shown.text();
+        let beside = [244_747.3, 2.447e11, 0.98].map(|ratio| row("k1_n_m_per_rad", 3.1, Some(ratio)));
+        let text = shown(stated, beside.to_vec()).text();
         let rows: Vec<Vec<&str>> =
             text.lines().filter(|line| line.contains("k1_")).map(|line| line.split_whitespace().collect()).collect();
         assert!(rows.iter().all(|row| row.len() >= 4 && row[1] == "3.1" && row[3].parse::<f64>().is_ok()), "{text}");
