@@ -1,5 +1,6 @@
 //! Least squares of few columns by their normal equations, projections off free columns, the jackknife.
 
+use crate::linear::Gram;
 use flexspline_algebra::{Mat, cholesky};
 use flexspline_base::robust::rms;
 use flexspline_base::statistics::mean;
@@ -17,20 +18,15 @@ impl Normal {
     /// Of `rows` rows of as many columns as `width` says; `put` puts the columns of a row in their places, and gives
     /// its value and its weight.
     pub fn of(width: usize, rows: usize, mut put: impl FnMut(usize, &mut [f64]) -> (f64, f64)) -> Option<Normal> {
-        let mut products = vec![0.0; width * width];
-        let (mut right, mut square, mut row) = (vec![0.0; width], 0.0, vec![1.0; width]);
+        let (mut gram, mut row) = (Gram::none(width + 1), vec![1.0; width + 1]);
         for k in 0..rows {
-            let (value, weight) = put(k, &mut row);
-            for a in 0..width {
-                right[a] += weight * row[a] * value;
-                for b in 0..=a {
-                    products[a * width + b] += weight * row[a] * row[b];
-                }
-            }
-            square += weight * value * value;
+            let (value, weight) = put(k, &mut row[..width]);
+            row[width] = value;
+            gram.add_row(&row, weight);
         }
-        let matrix = Mat::from_fn(width, width, |a, b| products[a.max(b) * width + a.min(b)]);
-        Some(Normal { inverse: cholesky(matrix.as_ref()).ok()?.inverse(), right, square })
+        let matrix = Mat::from_fn(width, width, |a, b| gram.at(a.max(b), a.min(b)));
+        let right = (0..width).map(|a| gram.at(width, a)).collect();
+        Some(Normal { inverse: cholesky(matrix.as_ref()).ok()?.inverse(), right, square: gram.at(width, width) })
     }
 
     /// Unless a variance has grown a million times by the other columns, which is no answer.
