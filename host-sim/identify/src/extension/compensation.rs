@@ -23,18 +23,6 @@ const FEWEST_SESSIONS: usize = 3;
 /// blocks of a calibration.
 const PARTS: usize = 9;
 
-/// A session, or a part of one, held out.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Compensated {
-    /// Which one, from 0.
-    pub session: usize,
-    /// Rows.
-    pub rows: usize,
-    /// What is left.
-    #[serde(flatten)]
-    pub left: Compensation,
-}
-
 /// A cause that is not in a table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct NotApplied {
@@ -63,10 +51,6 @@ pub struct Evaluation {
     /// What is left over the sessions held out.
     #[serde(flatten)]
     pub left: Compensation,
-    /// Each session held out.
-    pub sessions: Vec<Compensated>,
-    /// In how many of them the extended tables are better than the nominal ones.
-    pub improved: usize,
     /// Causes that are in the extended tables.
     pub applied: Vec<CauseName>,
     /// Causes that are not, and why.
@@ -90,12 +74,9 @@ impl Evaluation {
         let extended = Some(self.left.rms_extended_tables_arcsec).filter(gains).filter(|_| !self.applied.is_empty());
         let calibrated = self.left.rms_calibrated_table_arcsec.filter(gains);
         let swapped = extended.zip(calibrated).is_some_and(|(extended, calibrated)| less(calibrated, extended));
-        let mut all: Vec<(TableKind, f64)> = extended.map(|left| (TableKind::Extended, left)).into_iter().collect();
-        all.extend(calibrated.map(|left| (TableKind::Calibrated, left)));
-        if swapped {
-            all.reverse();
-        }
-        all
+        let [first, second] =
+            [extended.map(|left| (TableKind::Extended, left)), calibrated.map(|left| (TableKind::Calibrated, left))];
+        if swapped { [second, first] } else { [first, second] }.into_iter().flatten().collect()
     }
 
     /// What is left with each table, for a reader.
@@ -216,22 +197,17 @@ pub fn evaluate(
         }
     };
     let own: Vec<bool> = sessions.iter().map(|session| session.own_zero).collect();
-    let free = |left: Vec<Vec<f64>>| without_zero(left, &used, &own);
-    let by_extended = free(by_extended.unwrap_or_else(|| by_nominal.clone()));
-    let (none, by_nominal, by_calibrated) = (free(none), free(by_nominal), by_calibrated.map(free));
-    let held: Vec<usize> = (0..sessions.len()).filter(|k| !used[*k] && !sessions[*k].is_empty()).collect();
-    let left = |of: &dyn Fn(&Vec<Vec<f64>>) -> f64| Compensation {
-        rms_uncompensated_arcsec: of(&none),
-        rms_nominal_tables_arcsec: of(&by_nominal),
-        rms_calibrated_table_arcsec: by_calibrated.as_ref().map(of),
-        rms_extended_tables_arcsec: of(&by_extended),
+    let held = |left: Vec<Vec<f64>>| {
+        let held = without_zero(left, &used, &own).into_iter().zip(&used).filter(|(_, used)| !**used);
+        rms(&held.flat_map(|(left, _)| left).collect::<Vec<f64>>())
     };
-    let session = |&k: &usize| Compensated { session: k, rows: sessions[k].len(), left: left(&|left| rms(&left[k])) };
-    evaluation.sessions = held.iter().map(session).collect();
-    let all = |left: &Vec<Vec<f64>>| rms(&held.iter().flat_map(|k| left[*k].iter().copied()).collect::<Vec<f64>>());
-    evaluation.left = left(&all);
-    let better = |s: &&Compensated| s.left.rms_extended_tables_arcsec < s.left.rms_nominal_tables_arcsec;
-    evaluation.improved = evaluation.sessions.iter().filter(better).count();
+    let by_extended = by_extended.unwrap_or_else(|| by_nominal.clone());
+    evaluation.left = Compensation {
+        rms_uncompensated_arcsec: held(none),
+        rms_nominal_tables_arcsec: held(by_nominal),
+        rms_calibrated_table_arcsec: by_calibrated.map(held),
+        rms_extended_tables_arcsec: held(by_extended),
+    };
     evaluation
 }
 
