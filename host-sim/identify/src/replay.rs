@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::{CalibrationError, INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
+use crate::calibrate::{INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
 use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, quantile_of, white_noise,
@@ -258,10 +258,7 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
     if let Some(fault) = recording.faults.iter().find(in_other_unit) {
         return Err(refuse(Some(fault.first_line), fault.what.clone()));
     }
-    let said = check_ratio_of(&recording, ratio, MOST_ERROR_RAD).map_err(|error| match error {
-        CalibrationError::Ratio { other, .. } => refuse(None, other.to_string()),
-        other => refuse(None, other.to_string()),
-    })?;
+    let said = check_ratio_of(&recording, ratio, MOST_ERROR_RAD)?;
     recording.notes.extend(said);
     if recording.sessions.iter().all(|session| session.torque_n_m.is_none()) {
         let what =

@@ -36,6 +36,8 @@ use crate::misfit::LEAVES;
 pub use at_rest::{LoopFigure, TorqueLoop};
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path};
+use flexspline_base::robust::{dot, rms};
+use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use flexspline_mechanics::drive::GeneratorKind;
@@ -110,20 +112,12 @@ const ONE_TEMPERATURE_K: f64 = 2.0;
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
-    /// The logs cannot be read.
+    /// The logs cannot be read, or turn by another ratio.
     #[error(transparent)]
     Measured(#[from] MeasuredError),
     /// The knowledge of the drive makes no table.
     #[error("{0}")]
     Known(String),
-    /// The rows turn by another ratio.
-    #[error("{file}: {other}")]
-    Ratio {
-        /// The file.
-        file: String,
-        /// Both ratios.
-        other: OtherRatio,
-    },
     /// Too few rows in steady motion.
     #[error(
         "{0} rows in steady motion; at least {FEWEST_ROWS} are needed: record a longer way in one direction, as rows \
@@ -151,9 +145,7 @@ impl CalibrationError {
     #[must_use]
     pub fn of_files(&self, files: &[String]) -> String {
         match self {
-            CalibrationError::Measured(_) | CalibrationError::Known(_) | CalibrationError::Ratio { .. } => {
-                self.to_string()
-            }
+            CalibrationError::Measured(_) | CalibrationError::Known(_) => self.to_string(),
             _ => format!("{}: {self}", files.join(", ")),
         }
     }
@@ -407,78 +399,37 @@ pub struct Calibrated {
     pub shown: Vec<[f64; 3]>,
 }
 
-/// Another ratio by which rows turn than the one that is given.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error(
-    "ratio: found {given}, but the generator turns {found:.2} times for one turn of the output in these rows; allowed: \
-     {near}, or other units or signs of the columns"
-)]
-pub struct OtherRatio {
-    given: f64,
-    found: f64,
-    /// The ratio nearest to what was found, whole or a half.
-    near: f64,
-    /// Error by the given ratio, rms over the rows.
-    error_rad: f64,
-}
-
-impl OtherRatio {
-    /// The ratio that the rows turn by, if they contradict `ratio`.
-    fn of(log: &Recording, ratio: f64) -> Option<OtherRatio> {
-        let (mut xx, mut xe, mut ee, mut rows) = (0.0, 0.0, 0.0, 0.0);
-        for session in &log.sessions {
-            let count = session.len().max(1) as f64;
-            rows += count;
-            let output = || session.generator_rad.iter().map(|psi| psi / ratio);
-            let (x, e) = (output().sum::<f64>() / count, session.error_rad.iter().sum::<f64>() / count);
-            for (at, error) in output().zip(&session.error_rad) {
-                xx += (at - x) * (at - x);
-                xe += (at - x) * (error - e);
-                ee += (error - e) * (error - e);
-            }
-        }
-        if xx <= 0.0 || ee <= 0.0 {
-            return None;
-        }
-        let found = ratio / (1.0 + xe / xx);
-        let left = |other: f64| {
-            let slope = ratio / other - 1.0;
-            (ee - 2.0 * slope * xe + slope * slope * xx) / ee
-        };
-        // Wheels whose teeth differ by two have whole ratios and halves.
-        let near = (2.0 * found).round() / 2.0;
-        let error_rad = (ee / rows).sqrt();
-        (near != ratio && near.abs() >= 2.0 && left(near) < OTHER_RATIO).then_some(OtherRatio {
-            given: ratio,
-            found,
-            near,
-            error_rad,
-        })
-    }
-}
-
 /// Refuses a ratio that the rows of a log contradict; says so alone where it may be rounded, or the output moves little
 /// and errs by less than `by_a_load_rad`, rms: a load that grows over a few rows looks the same.
-pub(crate) fn check_ratio_of(
-    log: &Recording,
-    ratio: f64,
-    by_a_load_rad: f64,
-) -> Result<Option<String>, CalibrationError> {
-    let Some(other) = OtherRatio::of(log, ratio) else { return Ok(None) };
+pub(crate) fn check_ratio_of(log: &Recording, ratio: f64, by_a_load_rad: f64) -> Result<Option<String>, MeasuredError> {
+    let (mut output, mut error) = (Vec::new(), Vec::new());
+    for session in &log.sessions {
+        let angles: Vec<f64> = session.generator_rad.iter().map(|psi| psi / ratio).collect();
+        for (all, values) in [(&mut output, &angles), (&mut error, &session.error_rad)] {
+            let middle = mean(values);
+            all.extend(values.iter().map(|value| value - middle));
+        }
+    }
+    let [xx, xe, ee] = [(&output, &output), (&output, &error), (&error, &error)].map(|(a, b)| dot(a, b));
+    let found = ratio / (1.0 + xe / xx);
+    // Wheels whose teeth differ by two have whole ratios and halves.
+    let near = (2.0 * found).round() / 2.0;
+    let slope = ratio / near - 1.0;
+    let left = (ee - 2.0 * slope * xe + slope * slope * xx) / ee;
+    if xx <= 0.0 || ee <= 0.0 || near == ratio || near.abs() < 2.0 || left >= OTHER_RATIO {
+        return Ok(None);
+    }
+    let what = format!(
+        "ratio: found {ratio}, but the generator turns {found:.2} times for one turn of the output in these rows; \
+         allowed: {near}, or other units or signs of the columns"
+    );
     let (from, to) = least_and_most(log.sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
     let moves_little = (to - from) / ratio.abs() < PERIOD_OF_THE_OUTPUT * std::f64::consts::TAU;
-    let may_be_load = moves_little && other.error_rad < by_a_load_rad;
-    let is_far = (other.near - other.given).abs() >= 1.0;
-    if is_far && !may_be_load {
-        return Err(CalibrationError::Ratio { file: log.file.clone(), other });
+    let may_be_load = moves_little && rms(&error) < by_a_load_rad;
+    if (near - ratio).abs() >= 1.0 && !may_be_load {
+        return Err(MeasuredError { file: log.file.clone(), line: None, what });
     }
-    Ok(Some(other.to_string()))
-}
-
-/// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
-/// which the one gains a wave on the other.
-fn turns_to_tell_wheels(ratio: f64) -> f64 {
-    0.5 * ratio.abs()
+    Ok(Some(what))
 }
 
 /// The first two files that hold the same rows: one log that was given twice would be left out by what was fitted to

@@ -172,7 +172,8 @@ impl Recorded {
     pub(crate) fn lacks(&self, part: PartName, prior: &Prior<'_>) -> Option<String> {
         let [low, high] = self.scales.torque_n_m;
         let [cold, warm] = self.scales.temperature_c;
-        let turns_to_tell = super::turns_to_tell_wheels(prior.nominal.ratio);
+        // In half a turn of the output two waves in a turn gain a wave on two in a turn against the output.
+        let turns_to_tell = 0.5 * prior.nominal.ratio.abs();
         match part {
             PartName::WindUp if !self.has_torque => Some("no torque was recorded".to_owned()),
             PartName::WindUp if high - low < super::SAME_TORQUE * low.abs().max(high.abs()) || high <= low => {

@@ -574,13 +574,13 @@ fn a_ratio_that_the_rows_contradict_is_refused() {
         *error += psi / RATIO - psi / 100.0;
     }
     let refused = calibrate(std::slice::from_ref(&other), &Prior::of_ratio(100.0, GeneratorKind::Cam)).err().unwrap();
-    assert!(matches!(refused, CalibrationError::Ratio { .. }) && refused.to_string().contains("allowed: 101"));
+    assert!(matches!(refused, CalibrationError::Measured(_)) && refused.to_string().contains("allowed: 101"));
     // A short log alone as well.
     let mut short = other.clone();
     let drop: Vec<bool> = (0..short.sessions[0].len()).map(|k| k >= 200).collect();
     short.sessions[0].leave_out(&drop);
     let refused = calibrate(&[short], &Prior::of_ratio(100.0, GeneratorKind::Cam)).err().unwrap();
-    assert!(matches!(refused, CalibrationError::Ratio { .. }), "{refused}");
+    assert!(matches!(refused, CalibrationError::Measured(_)), "{refused}");
     // One of two logs, which together turn by no ratio, is named.
     other.file = "other.csv".to_owned();
     let session = &mut other.sessions[0];
