@@ -51,7 +51,7 @@ pub use prior::Prior;
 pub use reading::{ByCore, Reading};
 use reading::{DELAY, Delays, OFFSET, delay_note, play_of_a_millisecond};
 pub use rows::one_in;
-use rows::{FoldKind, Recorded, Rows, settled};
+use rows::{Recorded, Rows, settled};
 use split::SplitWaves;
 pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
 
@@ -315,12 +315,10 @@ pub struct Calibration {
     pub schema_version: u32,
     /// The logs.
     pub files: Vec<String>,
-    /// Rows of all, rows fitted, and rows left out because the output had not settled.
+    /// Rows of all, and rows fitted.
     pub rows: usize,
     /// See above.
     pub rows_fitted: usize,
-    /// See above.
-    pub rows_unsettled: usize,
     /// Folds left out in turn: `files` or `blocks`.
     pub left_out: &'static str,
     /// How many of them.
@@ -723,13 +721,9 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let calibration = Calibration {
         schema_version: 1,
         files: of_files,
-        rows: rows.of,
+        rows: core.rows,
         rows_fitted: rows.rows.len(),
-        rows_unsettled: rows.unsettled,
-        left_out: match rows.folds {
-            FoldKind::Files => "files",
-            FoldKind::Blocks => "blocks",
-        },
+        left_out: if rows.by_file { "files" } else { "blocks" },
         folds: folds.all().len(),
         held_out,
         core,

@@ -28,13 +28,6 @@ const SETTLED: f64 = 1.5;
 /// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it. *Guess*.
 const SURE: f64 = 3.0;
 
-/// How the folds were made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FoldKind {
-    Files,
-    Blocks,
-}
-
 /// Rows of all files.
 #[derive(Clone)]
 pub(super) struct Rows {
@@ -44,10 +37,8 @@ pub(super) struct Rows {
     /// Means taken off the measured error and off the residual of each file, arcsec.
     measured_means_arcsec: Vec<f64>,
     pub means_arcsec: Vec<f64>,
-    pub folds: FoldKind,
-    /// Rows of the files, and those not used because the output had not settled.
-    pub of: usize,
-    pub unsettled: usize,
+    /// Whether each file is a fold; else the folds are blocks of each.
+    pub by_file: bool,
 }
 
 /// States that the files have recorded.
@@ -249,9 +240,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
         loads: Vec::new(),
         measured_means_arcsec: Vec::new(),
         means_arcsec: Vec::new(),
-        folds: FoldKind::Blocks,
-        of: total,
-        unsettled: 0,
+        by_file: false,
     };
     let mut sessions = 0..;
     for (zero, file) in files.iter().enumerate() {
@@ -266,10 +255,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                 let at = |column: &Option<Vec<f64>>, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
                 let torque_n_m = if recorded.has_torque { at(&session.torque_n_m, 0.0) } else { 0.0 };
                 all.loads.push((number, torque_n_m));
-                let Some(way) = ways[k] else {
-                    all.unsettled += 1;
-                    continue;
-                };
+                let Some(way) = ways[k] else { continue };
                 let generator_rad = session.generator_rad[k];
                 let at = State {
                     generator_rad,
@@ -290,9 +276,9 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
         of_file.iter_mut().for_each(|row| row.measured_arcsec -= mean);
         all.measured_means_arcsec.push(mean);
     }
-    let by_file = (files.len() >= ENOUGH_FILES).then_some((FoldKind::Files, 1));
-    for (kind, rounds) in by_file.into_iter().chain([(FoldKind::Blocks, 1), (FoldKind::Blocks, ROUNDS)]) {
-        all.fold(kind, rounds);
+    let by_file = (files.len() >= ENOUGH_FILES).then_some((true, 1));
+    for (by_file, rounds) in by_file.into_iter().chain([(false, 1), (false, ROUNDS)]) {
+        all.fold(by_file, rounds);
         if all.folds_are_within_each_other(&recorded.scales) {
             break;
         }
@@ -302,19 +288,15 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
 
 impl Rows {
     /// Makes folds: of files, or of the blocks that each file is cut into, which go round a number of times.
-    fn fold(&mut self, kind: FoldKind, rounds: usize) {
-        self.folds = kind;
+    fn fold(&mut self, by_file: bool, rounds: usize) {
+        self.by_file = by_file;
         let mut of_file = vec![0; self.measured_means_arcsec.len()];
         self.rows.iter().for_each(|row| of_file[row.at.log] += 1);
         let mut before = vec![0; of_file.len()];
         for row in &mut self.rows {
             let block = before[row.at.log] * BLOCKS * rounds / of_file[row.at.log];
             before[row.at.log] += 1;
-            let fold = match kind {
-                FoldKind::Files => row.at.log,
-                FoldKind::Blocks => block,
-            };
-            row.fold = fold % BLOCKS;
+            row.fold = if by_file { row.at.log } else { block } % BLOCKS;
         }
     }
 
@@ -357,15 +339,15 @@ impl Rows {
 
     /// With blocks of each log for folds: what is a log's own is not seen in the others.
     pub(crate) fn in_blocks(mut self) -> Rows {
-        if self.folds != FoldKind::Blocks {
-            self.fold(FoldKind::Blocks, ROUNDS);
+        if self.by_file {
+            self.fold(false, ROUNDS);
         }
         self
     }
 
     /// Sums over their folds.
     pub(crate) fn folds_of(&self, parts: &[PartName], scales: &Scales) -> Folds {
-        Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.folds == FoldKind::Files)
+        Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.by_file)
     }
 
     /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from
@@ -373,7 +355,6 @@ impl Rows {
     pub(crate) fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
         let all = self.rows.len();
         self.rows.retain(|row| (row.at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m);
-        self.unsettled += all - self.rows.len();
         self
     }
 
