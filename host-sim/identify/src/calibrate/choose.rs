@@ -1,6 +1,7 @@
 //! Which parts a unit has, and how smooth they are: by what fits leave in folds that they did not see.
 
 use super::folds::{Chosen, Folds};
+use super::parts::PartName;
 
 /// Penalties that are tried, of a column's mean square. Below the least of them a curve is free to run away where
 /// nothing was recorded: with a tenth of it the first eighth of the record of `examples/lara8` is missed by 120
@@ -15,33 +16,25 @@ pub(super) fn path(folds: &Folds, of: &[usize]) -> Vec<Vec<Chosen>> {
     let mut all = vec![Vec::new()];
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut left = folds.left_out(of, &chosen);
-    while let Some((best, with)) = best_next(folds, of, &chosen) {
-        if with > left * (1.0 - LEAST_GAIN) {
-            break;
-        }
+    loop {
+        let open = folds.parts.iter().filter(|part| chosen.iter().all(|chosen| chosen.part != **part));
+        let tried = open.map(|part| best_penalty(folds, of, &chosen, *part));
+        let best = tried.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, with)| *with <= left * (1.0 - LEAST_GAIN));
+        let Some((best, _)) = best else { return all };
         chosen.push(best);
         left = tuned(folds, of, &mut chosen);
         all.push(chosen.clone());
     }
-    all
-}
-
-/// The part, with its penalty, that leaves least beside those chosen.
-pub(super) fn best_next(folds: &Folds, of: &[usize], chosen: &[Chosen]) -> Option<(Chosen, f64)> {
-    let open = folds.parts.iter().filter(|part| chosen.iter().all(|chosen| chosen.part != **part));
-    open.map(|part| best_penalty(folds, of, chosen, Chosen { part: *part, penalty: 0.0 }))
-        .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// A further part with the penalty that leaves least.
-pub(super) fn best_penalty(folds: &Folds, of: &[usize], chosen: &[Chosen], further: Chosen) -> (Chosen, f64) {
+pub(super) fn best_penalty(folds: &Folds, of: &[usize], chosen: &[Chosen], part: PartName) -> (Chosen, f64) {
     let with = |penalty: f64| {
-        let further = Chosen { penalty, ..further };
-        let all: Vec<Chosen> = chosen.iter().copied().chain([further]).collect();
-        (further, folds.left_out(of, &all))
+        let further = Chosen { part, penalty };
+        (further, folds.left_out(of, &[chosen, &[further]].concat()))
     };
     let tried = PENALTIES.into_iter().map(with);
-    tried.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((further, f64::INFINITY))
+    tried.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Chosen { part, penalty: 0.0 }, f64::INFINITY))
 }
 
 /// Sets each penalty anew beside the others; gives what is left.
@@ -49,7 +42,7 @@ fn tuned(folds: &Folds, of: &[usize], chosen: &mut [Chosen]) -> f64 {
     let mut left = folds.left_out(of, chosen);
     for place in 0..chosen.len() {
         let others: Vec<Chosen> = (0..chosen.len()).filter(|k| *k != place).map(|k| chosen[k]).collect();
-        (chosen[place], left) = best_penalty(folds, of, &others, chosen[place]);
+        (chosen[place], left) = best_penalty(folds, of, &others, chosen[place].part);
     }
     left
 }

@@ -12,7 +12,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use flexspline_base::robust::dot;
+use flexspline_base::robust::{dot, rms};
 use serde::Serialize;
 
 use super::Model;
@@ -326,14 +326,7 @@ impl ModelUncertainty {
 
     /// Mean square root of the half widths at some states, arcsec.
     pub(super) fn mean_half_width_arcsec(&self, states: impl Iterator<Item = State>) -> f64 {
-        let (count, squares) = states
-            .fold((0.0, 0.0), |(count, squares), at| (count + 1.0, squares + self.half_width_arcsec(&at).powi(2)));
-        (squares / f64::max(count, 1.0)).sqrt()
-    }
-
-    /// Standard deviation of the delay of a log, as a number of its column.
-    pub(super) fn std_of_delay(&self, log: usize) -> Option<f64> {
-        self.std_of(PartName::ReadingDelay(log), 0)
+        rms(&states.map(|at| self.half_width_arcsec(&at)).collect::<Vec<f64>>())
     }
 
     /// Standard deviation of a coefficient of a part.

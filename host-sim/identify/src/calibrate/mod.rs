@@ -607,12 +607,9 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         }
         sessions.extend(piece.sessions);
     }
-    on_one_output_zero(Recording { sessions, ..log }, &prior)
-}
-
-/// A log with the output of each session on the zero of the first, if sessions have zeros of their own by a table.
-fn on_one_output_zero(mut log: Recording, prior: &Prior<'_>) -> Recording {
-    if let Some((_, Rows { means_arcsec: means, .. })) = set_anew(std::slice::from_ref(&log), prior) {
+    log.sessions = sessions;
+    // Where sessions have zeros of their own, the output of each is put on that of the first.
+    if let Some((_, Rows { means_arcsec: means, .. })) = set_anew(std::slice::from_ref(&log), &prior) {
         let off_arcsec = means.iter().map(|mean| mean - means[0]);
         for (session, off_arcsec) in log.sessions.iter_mut().zip(off_arcsec) {
             session.error_rad.iter_mut().for_each(|error| *error -= off_arcsec / ARCSEC_PER_RAD);
@@ -696,13 +693,15 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
-    let mut offsets = offsets(files, &rows, &model, known.noise);
-    for offset in &mut offsets {
+    let offset = |(log, middle): (usize, &f64)| {
+        let left: Vec<f64> = rows.rows.iter().filter(|row| row.at.log == log).map(zero).collect();
+        let count = left.len().max(1) as f64;
         // The output is known no better than the generator.
-        let zero = readings.iter().find(|zero| zero.name == ZERO && zero.file == offset.file);
-        let by_zero = zero.map_or(0.0, |zero| zero.std.to_radians() / prior.nominal.ratio * ARCSEC_PER_RAD);
-        offset.std = offset.std.hypot(by_zero);
-    }
+        let by_zero = readings.iter().find(|zero| zero.name == ZERO && zero.file == files[log].file);
+        let by_zero = by_zero.map_or(0.0, |zero| zero.std.to_radians() / prior.nominal.ratio * ARCSEC_PER_RAD);
+        Some([middle + left.iter().sum::<f64>() / count, (known.noise.of_a_row() / count).sqrt().hypot(by_zero)])
+    };
+    let offsets = Reading::of_logs(OFFSET, files, rows.means_arcsec.iter().enumerate().map(offset));
     readings.extend(offsets);
     notes.extend(split.then(|| SPLIT_BY.to_owned()));
     let of_whom = |changes: Vec<(PartName, f64)>| {
@@ -799,30 +798,13 @@ const SPLIT_BY: &str = "the split takes for an encoder's what changes neither wi
                         waves of displaced wheels at least half does; an error of a gear that does not counts as the \
                         encoder's";
 
-/// The zero of the output in each file.
-fn offsets(files: &[Recording], rows: &Rows, model: &Model, noise: RowNoise) -> Vec<Reading> {
-    let mut sums = vec![(0.0, 0.0); files.len()];
-    for row in &rows.rows {
-        sums[row.at.log].0 += row.left_arcsec - model.adds_arcsec(&row.at);
-        sums[row.at.log].1 += 1.0;
-    }
-    let offset = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| Reading {
-        name: OFFSET,
-        file: Some(file.file.clone()),
-        value: mean + sum / f64::max(count, 1.0),
-        std: (noise.of_a_row() / f64::max(count, 1.0)).sqrt(),
-    };
-    files.iter().zip(sums).zip(&rows.means_arcsec).map(offset).collect()
-}
-
 /// A part that is not fitted, and why.
 type Without = (PartName, &'static str);
 
 struct Fitted {
     rows: Rows,
     folds: Folds,
-    /// Parts that could be chosen, and those that were not to be.
-    open: Vec<PartName>,
+    /// Parts that were not to be chosen.
     without: Vec<Without>,
     model: Model,
     held_out: HeldOut,
@@ -831,7 +813,7 @@ struct Fitted {
 impl Fitted {
     /// Whether several logs agree.
     fn agreement(&self) -> Option<Agreement> {
-        Agreement::of(&self.rows, &self.open, &self.model.scales)
+        Agreement::of(&self.rows, &self.folds.parts, &self.model.scales)
     }
 
     /// No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
@@ -871,40 +853,30 @@ impl Fitted {
         let all = folds.all();
         let before = folds.left_out(&all, &[]);
         let with = folds.left_out(&all, &model.chosen);
-        let percent = |share: f64| 100.0 * share;
         let says = |part: PartName| {
             let chosen = model.chosen.iter().find(|chosen| chosen.part == part);
             let refused = recorded.lacks(part, prior).or_else(|| {
                 let without = self.without.iter().find(|(other, _)| *other == part);
                 without.map(|(_, why)| (*why).to_owned())
             });
-            let (held_out_gain, why) = if let Some(why) = refused {
-                (None, why)
-            } else if chosen.is_some() {
+            let explained = || {
                 let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
                 let without = folds.left_out(&all, &others);
-                let why = format!(
-                    "explains {:.1} % of the remaining variance (threshold {:.0} %); without it the held-out error is \
-                     {:.2} times as large",
-                    percent((without - with) / without),
-                    percent(LEAST_GAIN),
-                    (without / with).sqrt()
-                );
-                (Some((without - with) / before), why)
-            } else {
-                let (_, left) = best_penalty(folds, &all, &model.chosen, Chosen { part, penalty: 0.0 });
-                let share = (with - left) / with;
-                let why = if share > LEAST_GAIN {
+                let with = chosen.map_or_else(|| best_penalty(folds, &all, &others, part).1, |_| with);
+                let share = (without - with) / without;
+                let explain =
+                    format!("{:.1} % of the remaining variance (threshold {:.0} %)", 100.0 * share, 100.0 * LEAST_GAIN);
+                let why = if chosen.is_some() {
+                    let times = (without / with).sqrt();
+                    format!("explains {explain}; without it the held-out error is {times:.2} times as large")
+                } else if share > LEAST_GAIN {
                     "reduces the error in the rows it was chosen on, not in those held out".to_owned()
                 } else {
-                    format!(
-                        "would explain {:.1} % of the remaining variance (threshold {:.0} %)",
-                        percent(share),
-                        percent(LEAST_GAIN)
-                    )
+                    format!("would explain {explain}")
                 };
-                (Some((with - left) / before), why)
+                (Some((without - with) / before), why)
             };
+            let (held_out_gain, why) = refused.map_or_else(explained, |why| (None, why));
             PartSays {
                 name: part.as_str(),
                 kept: chosen.is_some(),
@@ -955,7 +927,7 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
             rms_prior_arcsec: rms(folds.left_out(&all, &[])),
             rms_after_arcsec: rms(left[most]),
         };
-        return Ok(Fitted { rows, folds, open, without, model, held_out });
+        return Ok(Fitted { rows, folds, without, model, held_out });
     }
 }
 
@@ -983,7 +955,6 @@ fn remarks(
     model: &Model,
     play_of_a_millisecond_arcsec: Option<f64>,
 ) -> Vec<String> {
-    let has = |part: PartName| model.chosen.iter().any(|chosen| chosen.part == part);
     let said = |there: bool, what: &str| there.then(|| what.to_owned());
     let by_ratio = prior.nominal.teeth.is_none() && prior.table.is_none();
     let teeth = prior.nominal.teeth_or_of_two_waves();
@@ -999,7 +970,7 @@ fn remarks(
             "no part gains in what was left out: the table is what was known before, its zeros aside; are the logs of \
              this unit, and of one?",
         ),
-        (recorded.output_share < 1.0 && has(PartName::OutputAngle)).then(|| {
+        (recorded.output_share < 1.0 && model.of(PartName::OutputAngle).is_some()).then(|| {
             format!(
                 "{:.0} % of an output turn was recorded: in the rest the curve over the output angle {}, and is not \
                  measured",

@@ -30,12 +30,26 @@ pub struct Reading {
     /// the first log is zero).
     pub name: &'static str,
     /// The log.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub file: Option<String>,
+    pub file: String,
     /// Value.
     pub value: f64,
     /// Standard deviation.
     pub std: f64,
+}
+
+impl Reading {
+    /// One of each log that has it: its value and standard deviation.
+    pub(super) fn of_logs(
+        name: &'static str,
+        files: &[Recording],
+        found: impl Iterator<Item = Option<[f64; 2]>>,
+    ) -> Vec<Reading> {
+        let reading = |(file, found): (&Recording, Option<[f64; 2]>)| {
+            let [value, std] = found?;
+            Some(Reading { name, file: file.file.clone(), value, std })
+        };
+        files.iter().zip(found).filter_map(reading).collect()
+    }
 }
 
 /// The delay of each log with its standard deviation, s; `None` of a log that shows none.
@@ -86,8 +100,8 @@ impl Delays {
         let of_all = known(&with_all)?;
         let left = folds.left_out(&all, &chosen);
         let is_told = |delay: &Chosen| {
-            let PartName::ReadingDelay(log) = delay.part else { return true };
-            let (Some(of), Some(std)) = (with_all.of(delay.part), of_all.std_of_delay(log)) else { return false };
+            let PartName::ReadingDelay(_) = delay.part else { return true };
+            let (Some(of), Some(std)) = (with_all.of(delay.part), of_all.std_of(delay.part, 0)) else { return false };
             let value = with_all.coefficients[of.start];
             let others: Vec<Chosen> = chosen.iter().copied().filter(|other| other != delay).collect();
             // A share of a log in all rows is no larger the more logs there are.
@@ -106,10 +120,10 @@ impl Delays {
         let known = known(&model)?;
         // The column is the speed over its scale.
         let s_of_arcsec = 1.0 / ARCSEC_PER_RAD / scales.speed_rad_s;
-        let found = delays.iter().enumerate().map(|(log, delay)| {
+        let found = delays.iter().map(|delay| {
             let by = -model.coefficients[model.of(*delay)?.start];
             // At one pace it leads by no less, but any play may hide more of it.
-            let std_s = known.std_of_delay(log)? * s_of_arcsec;
+            let std_s = known.std_of(*delay, 0)? * s_of_arcsec;
             Some([by * s_of_arcsec, if hidden { std_s.hypot(scales.late_s) } else { std_s }])
         });
         Some(Delays(found.collect()))
@@ -137,11 +151,7 @@ impl Delays {
 
     /// Those of the logs that show one.
     pub(crate) fn readings(&self, files: &[Recording]) -> Vec<Reading> {
-        let reading = |(file, delay): (&Recording, &Option<[f64; 2]>)| {
-            let [value, std] = (*delay)?;
-            Some(Reading { name: DELAY, file: Some(file.file.clone()), value, std })
-        };
-        files.iter().zip(&self.0).filter_map(reading).collect()
+        Reading::of_logs(DELAY, files, self.0.iter().copied())
     }
 }
 
@@ -149,7 +159,7 @@ impl Delays {
 pub(super) fn delay_note(readings: &[Reading], logs: usize) -> Option<String> {
     let of_log = |reading: &Reading| {
         let (old, new) = if reading.value > 0.0 { ("output", "generator") } else { ("generator", "output") };
-        let file = reading.file.as_deref().filter(|_| logs > 1).map_or(String::new(), |file| format!(" of {file}"));
+        let file = if logs > 1 { format!(" of {}", reading.file) } else { String::new() };
         format!(
             "in each row{file} the {old} is {:.3} ± {:.3} ms older than the {new}",
             1e3 * reading.value.abs(),

@@ -353,7 +353,6 @@ impl Rows {
     /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from
     /// `friction_n_m` on decide it.
     pub(crate) fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
-        let all = self.rows.len();
         self.rows.retain(|row| (row.at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m);
         self
     }

@@ -165,7 +165,7 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
     });
     let c = calibrate(&of_logs, &prior).unwrap().calibration;
     let delays: Vec<&Reading> = c.readings.iter().filter(|reading| reading.name == "delay").collect();
-    assert!(delays.len() == 1 && delays[0].file == Some(of_logs[0].file.clone()), "{delays:?}");
+    assert!(delays.len() == 1 && delays[0].file == of_logs[0].file, "{delays:?}");
     assert!((delays[0].value - 0.004).abs() < OF_95 * delays[0].std && delays[0].std < 2e-4, "{delays:?}");
     // Of several logs it is told once.
     let files = [3, 4].map(|seed| at_paces(recording(seed, |psi, _, _, _| 25.0 * (2.0 * psi).sin()), 0.005));

@@ -94,9 +94,9 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
         let slope = (model.under_arcsec(high, prior) - model.under_arcsec(low, prior)) / (high - low);
         (high - low > SAME_TORQUE * most && slope > 0.0).then_some((log, slope))
     });
-    let slopes: Vec<(usize, f64)> = slopes.collect();
-    let (soft, stiff) =
-        (slopes.iter().max_by(|a, b| a.1.total_cmp(&b.1))?, slopes.iter().min_by(|a, b| a.1.total_cmp(&b.1))?);
+    let mut slopes: Vec<(usize, f64)> = slopes.collect();
+    slopes.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let (stiff, soft) = (slopes.first()?, slopes.last()?);
     (soft.1 > OTHER_SLOPE * stiff.1).then(|| {
         format!(
             "the loads of the logs do not agree: {:.3} arcsec for a newton-metre in {}, {:.3} in {}, {:.1} times less; \
@@ -177,11 +177,7 @@ impl Starts {
 
     /// The zeros, deg of the generator.
     pub(super) fn readings(&self, files: &[Recording]) -> Vec<Reading> {
-        let reading = |(file, start): (&Recording, &Start)| {
-            let [value, std] = start.zero_rad?.map(f64::to_degrees);
-            Some(Reading { name: ZERO, file: Some(file.file.clone()), value, std })
-        };
-        files.iter().zip(&self.0).filter_map(reading).collect()
+        Reading::of_logs(ZERO, files, self.0.iter().map(|start| Some(start.zero_rad?.map(f64::to_degrees))))
     }
 
     /// Notes on them.
