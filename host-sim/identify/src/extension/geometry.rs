@@ -60,25 +60,6 @@ pub(crate) struct Probe {
 }
 
 impl Probe {
-    fn new(
-        extended: &Extended,
-        nominal: &Nominal,
-        table: Option<&Table<'_>>,
-        generator: Vec<f64>,
-        orientation_rad: f64,
-    ) -> Probe {
-        let session = |load: f64| {
-            let n = generator.len();
-            let time_s = (0..n).map(|k| 1e4 * k as f64).collect();
-            let others = [load, nominal.temperature_c, orientation_rad].map(|value| vec![value; n]);
-            Session::imagined(time_s, generator.clone(), others)
-        };
-        let load = PROBE_N_M.max(1.5 * nominal.friction_torque_n_m);
-        let [plus, minus] =
-            [load, -load].map(|load| extended.predict(&[session(load)], nominal, table).remove(0).cause_arcsec);
-        Probe { generator, ratio: nominal.ratio, error: [plus, minus] }
-    }
-
     /// Projection of a cause on an order of the angle on the flexspline or the circular spline.
     fn wave(&self, cause: usize, on_circular_spline: bool, order: f64) -> [Wave; 2] {
         let share = if on_circular_spline { 1.0 - 1.0 / self.ratio } else { 1.0 };
@@ -305,7 +286,15 @@ pub(crate) fn found_geometry(
 ) -> Result<FoundGeometry, DriveError> {
     let step = TAU * nominal.ratio.abs() / POSITIONS as f64;
     let generator: Vec<f64> = (0..POSITIONS).map(|k| k as f64 * step).collect();
-    let probe = Probe::new(extended, nominal, table, generator, orientation_rad.unwrap_or(0.0));
+    let error_under = |load: f64| {
+        let time_s = (0..POSITIONS).map(|k| 1e4 * k as f64).collect();
+        let others = [load, nominal.temperature_c, orientation_rad.unwrap_or(0.0)];
+        let session = Session::imagined(time_s, generator.clone(), others.map(|value| vec![value; POSITIONS]));
+        extended.predict(&[session], nominal, table).remove(0).cause_arcsec
+    };
+    let load = PROBE_N_M.max(1.5 * nominal.friction_torque_n_m);
+    let error = [load, -load].map(error_under);
+    let probe = Probe { generator, ratio: nominal.ratio, error };
     let mut found = drive.clone();
     let (mut fields, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
