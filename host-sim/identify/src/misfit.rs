@@ -1,7 +1,7 @@
 //! Reasons why a table leaves much of measured rows: the torque counts the other way, or the load at each angle is
 //! another than when the table was made. Each is held against the rows by what the table would leave with it.
 
-use flexspline::{Prediction, Table};
+use flexspline::Table;
 
 use super::replay::{MeasuredRow, by_core};
 use crate::calibrate::TURNS_WITH_THE_OUTPUT;
@@ -13,56 +13,28 @@ const LOOKED_AT: usize = 2000;
 /// A reason has to leave less than this share of what the table leaves as the rows stand. *Guess*.
 pub(crate) const LEAVES: f64 = 0.7;
 
-/// A sample of the rows with what the table leaves of them.
-pub(crate) struct Misfit<'a> {
-    table: &'a Table<'a>,
-    rows: Vec<&'a MeasuredRow>,
-    /// As the rows stand, arcsec.
-    residual: Vec<f64>,
-    /// A reason has to leave less than this about the mean, arcsec rms: clearly less than the table does as the rows
-    /// stand, and than they have without it. A table that still takes nothing is no table of these rows.
-    most_left: f64,
-}
-
-impl<'a> Misfit<'a> {
-    pub(crate) fn of(table: &'a Table<'a>, rows: &'a [MeasuredRow]) -> Misfit<'a> {
-        let rows: Vec<&MeasuredRow> = rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect();
-        let residual = residual(table, &rows, 1.0);
-        let measured: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
-        let most_left = LEAVES * about_mean(&residual).min(about_mean(&measured));
-        Misfit { table, rows, residual, most_left }
-    }
-
-    fn clear(&self, left: f64) -> Option<f64> {
-        (left < self.most_left).then_some(left)
-    }
-
-    /// What the table leaves with the torque's sign turned, arcsec rms.
-    pub(crate) fn torque_turned(&self) -> Option<f64> {
-        self.clear(about_mean(&residual(self.table, &self.rows, -1.0)))
-    }
-
-    /// What another spring and another first wave of the output would leave of the residual, arcsec rms, where the load
-    /// goes with the output's angle: a table of rows in one posture has the one for the other.
-    pub(crate) fn other_load(&self) -> Option<f64> {
-        let ratio = self.table.drive().exact_ratio();
-        let column = |of: fn(f64) -> f64| self.rows.iter().map(move |row| of(row.generator_rad / ratio)).collect();
-        let torque: Vec<f64> = self.rows.iter().map(|row| row.torque_n_m).collect();
-        let waves: [Vec<f64>; 3] = [column(|_| 1.0), column(f64::sin), column(f64::cos)];
-        let beside = FreeSpan::default().beyond(waves.clone()).freed(torque.clone());
-        let goes_with_angle = about_mean(&beside) < (1.0 - TURNS_WITH_THE_OUTPUT.powi(2)).sqrt() * about_mean(&torque);
-        let span = FreeSpan::default().beyond(waves.into_iter().chain([torque]));
-        self.clear(about_mean(&span.freed(self.residual.clone()))).filter(|_| goes_with_angle)
-    }
-}
-
-/// What the table leaves of rows, arcsec, with this sign of the torque.
-fn residual(table: &Table<'_>, rows: &[&MeasuredRow], sign: f64) -> Vec<f64> {
-    let states = rows.iter().map(|row| [row.generator_rad, sign * row.torque_n_m, row.temperature_c]);
-    let residual = |(row, said): (&&MeasuredRow, Prediction)| {
-        row.error_arcsec - f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD
+/// What a table would leave of rows, arcsec rms: with the torque's sign turned, and with another spring and another
+/// first wave of the output; each where that is clearly less than the table leaves as they stand, and than they have
+/// without it, as a table that still takes nothing is no table of these rows. Another spring is asked where the load
+/// goes with the output's angle: a table of rows in one posture has the one for the other.
+pub(crate) fn explained(table: &Table<'_>, rows: &[MeasuredRow]) -> [Option<f64>; 2] {
+    let rows: Vec<&MeasuredRow> = rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect();
+    let residual = |sign: f64| -> Vec<f64> {
+        let states = rows.iter().map(|row| [row.generator_rad, sign * row.torque_n_m, row.temperature_c]);
+        let said = by_core(table, states).map(|said| f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD);
+        rows.iter().zip(said).map(|(row, said)| row.error_arcsec - said).collect()
     };
-    rows.iter().zip(by_core(table, states)).map(residual).collect()
+    let column = |of: &dyn Fn(&MeasuredRow) -> f64| rows.iter().map(|row| of(row)).collect::<Vec<f64>>();
+    let ratio = table.drive().exact_ratio();
+    let wave = |of: fn(f64) -> f64| column(&|row| of(row.generator_rad / ratio));
+    let (as_it_stands, torque) = (residual(1.0), column(&|row| row.torque_n_m));
+    let most_left = LEAVES * about_mean(&as_it_stands).min(about_mean(&column(&|row| row.error_arcsec)));
+    let waves = [wave(|_| 1.0), wave(f64::sin), wave(f64::cos)];
+    let beside = FreeSpan::default().beyond(waves.clone()).freed(torque.clone());
+    let goes_with_angle = about_mean(&beside) < (1.0 - TURNS_WITH_THE_OUTPUT.powi(2)).sqrt() * about_mean(&torque);
+    let span = FreeSpan::default().beyond(waves.into_iter().chain([torque]));
+    let other_load = Some(about_mean(&span.freed(as_it_stands))).filter(|_| goes_with_angle);
+    [Some(about_mean(&residual(-1.0))), other_load].map(|left| left.filter(|left| *left < most_left))
 }
 
 /// Root mean square about the mean.
@@ -105,7 +77,7 @@ mod tests {
             };
             (0..1500).map(row).collect()
         };
-        let torque_turned = |rows: Vec<MeasuredRow>| Misfit::of(&table, &rows).torque_turned();
+        let torque_turned = |rows: Vec<MeasuredRow>| explained(&table, &rows)[0];
         assert!(torque_turned(rows(100.0, -1.0)).is_some_and(|left| left < 1.0));
         assert_eq!(torque_turned(rows(100.0, 1.0)), None);
         assert_eq!(torque_turned(rows(0.0, -1.0)), None);

@@ -15,7 +15,7 @@ use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, quantile_of, white_noise,
 };
-use crate::misfit::{Misfit, about_mean};
+use crate::misfit::{about_mean, explained};
 use crate::nominal::Nominal;
 use crate::wind_up::along;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -183,24 +183,22 @@ impl ReplaySummary {
                  what turns the output forward: --columns torque=NAME:-N.m"
             )
         }));
-        let is_of_unit = "is it the table of this unit, with the generator zero of these rows?";
-        let nothing = left > measured;
-        let begin = if nothing {
-            format!(
-                "the residual with the table is {left:.1} arcsec rms, {measured:.1} without it: the table is worse \
-                 than none here"
-            )
-        } else {
-            format!("the residual with the table is {left:.1} arcsec rms, {measured:.1} without it")
-        };
-        match why.as_slice() {
-            [] if nothing => {
-                vec![format!("{begin}; no sign of the torque explains that; {is_of_unit}")]
+        let mut nothing = "";
+        if left > measured {
+            nothing = ": the table is worse than none here";
+            if why.is_empty() {
+                let unexplained = "no sign of the torque explains that; is it the table of this unit, with the \
+                                   generator zero of these rows?";
+                why.push(unexplained.to_owned());
             }
-            [] => Vec::new(),
-            [one] => vec![format!("{begin}; {one}")],
-            several => vec![format!("{begin}; these rows allow several reasons: {}", several.join("; or "))],
         }
+        let several = if why.len() > 1 { "these rows allow several reasons: " } else { "" };
+        let says = |why: String| {
+            format!(
+                "the residual with the table is {left:.1} arcsec rms, {measured:.1} without it{nothing}; {several}{why}"
+            )
+        };
+        (!why.is_empty()).then(|| says(why.join("; or "))).into_iter().collect()
     }
 }
 
@@ -305,19 +303,24 @@ pub fn replay(
 ) -> (Vec<ReplayedRow>, ReplaySummary) {
     let mut by_quality = [0; 4];
     let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
-    let mut replayed: Vec<ReplayedRow> = rows
-        .iter()
-        .zip(by_core(table, states))
-        .map(|(row, said)| {
+    let said: Vec<Prediction> = by_core(table, states).collect();
+    let predicted = said.iter().map(|said| f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD);
+    let measured: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
+    let residuals: Vec<f64> =
+        measured.iter().zip(predicted).map(|(measured, predicted)| measured - predicted).collect();
+    let mean_residual_arcsec = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
+    let off: Vec<f64> = residuals.iter().map(|residual| (residual - mean_residual_arcsec).abs()).collect();
+    let torques = torques_read(table, rows, &off, wind_up);
+    let replayed =
+        rows.iter().zip(&said).zip(residuals.iter().zip(torques)).map(|((row, said), (residual, torque))| {
             by_quality[said.quality as usize] += 1;
-            let predicted_arcsec = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
             ReplayedRow {
                 generator_rad: row.generator_rad,
                 torque_n_m: row.torque_n_m,
                 temperature_c: row.temperature_c,
                 measured_arcsec: row.error_arcsec,
-                predicted_arcsec,
-                residual_arcsec: row.error_arcsec - predicted_arcsec,
+                predicted_arcsec: f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD,
+                residual_arcsec: *residual,
                 uncertainty_arcsec: f64::from(said.uncertainty_rad) * ARCSEC_PER_RAD,
                 quality: match said.quality {
                     Quality::InRange => "in range",
@@ -325,30 +328,25 @@ pub fn replay(
                     Quality::Extrapolated => "extrapolated",
                     Quality::Disabled => "disabled",
                 },
-                torque_from_wind_up_n_m: f64::NAN,
-                torque_from_wind_up_low_n_m: f64::NAN,
-                torque_from_wind_up_high_n_m: f64::NAN,
+                torque_from_wind_up_n_m: torque[0],
+                torque_from_wind_up_low_n_m: torque[1],
+                torque_from_wind_up_high_n_m: torque[2],
             }
-        })
-        .collect();
-    let residuals: Vec<f64> = replayed.iter().map(|row| row.residual_arcsec).collect();
-    let mean_residual_arcsec = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
-    let off: Vec<f64> = residuals.iter().map(|residual| (residual - mean_residual_arcsec).abs()).collect();
-    read_torques(table, rows, (&mut replayed, &off), wind_up);
-    let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
-    let found = Misfit::of(table, rows);
+        });
+    let replayed: Vec<ReplayedRow> = replayed.collect();
+    let [torque_turned_rms_arcsec, other_load_rms_arcsec] = explained(table, rows);
     let mut summary = ReplaySummary {
         schema_version: 1,
         status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
         table_id: table.id().to_string(),
         rows: replayed.len(),
-        rms_measured_arcsec: about(|row| row.measured_arcsec),
-        rms_residual_arcsec: about(|row| row.residual_arcsec),
+        rms_measured_arcsec: about_mean(&measured),
+        rms_residual_arcsec: about_mean(&residuals),
         max_residual_arcsec: off.iter().copied().fold(0.0, f64::max),
         mean_residual_arcsec,
         rows_by_quality: by_quality,
-        torque_turned_rms_arcsec: found.torque_turned(),
-        other_load_rms_arcsec: found.other_load(),
+        torque_turned_rms_arcsec,
+        other_load_rms_arcsec,
         rows_of: None,
         remarks: Vec::new(),
         data_faults: Vec::new(),
@@ -359,15 +357,15 @@ pub fn replay(
     (replayed, summary)
 }
 
-/// Puts in the torques that the wind-up says. The intervals are of what the calibration left, or of the noise of the
-/// rows if that is more. Without a calibration they are of what the table leaves of the rows; without a torque, of the
-/// noise of the rows and of what the table leaves of its samples.
-fn read_torques(
+/// Torques that the wind-up says, each with its least and its most. The intervals are of what the calibration left, or
+/// of the noise of the rows if that is more. Without a calibration they are of what the table leaves of the rows;
+/// without a torque, of the noise of the rows and of what the table leaves of its samples.
+fn torques_read(
     table: &Table<'_>,
     rows: &[MeasuredRow],
-    (replayed, off_arcsec): (&mut [ReplayedRow], &[f64]),
+    off_arcsec: &[f64],
     calibrated: Option<WindUpTorque>,
-) {
+) -> Vec<[f64; 3]> {
     let errors: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
     let noise_arcsec = white_noise([&errors[..]]);
     let half_width_arcsec = if let Some(calibrated) = &calibrated {
@@ -378,12 +376,9 @@ fn read_torques(
         OF_95 * noise_arcsec.hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)
     };
     let hysteresis = calibrated.and_then(|calibrated| calibrated.hysteresis).unwrap_or_default();
-    let torques = along(table, rows, &hysteresis, |curve, row, error_rad| {
+    along(table, rows, &hysteresis, |curve, row, error_rad| {
         curve.read(row.generator_rad, error_rad, row.temperature_c, half_width_arcsec / ARCSEC_PER_RAD)
-    });
-    for (row, torque) in replayed.iter_mut().zip(torques) {
-        [row.torque_from_wind_up_n_m, row.torque_from_wind_up_low_n_m, row.torque_from_wind_up_high_n_m] = torque;
-    }
+    })
 }
 
 #[cfg(test)]
