@@ -280,9 +280,7 @@ impl<'a> Grid<'a> {
             })
             .collect()
     }
-}
 
-impl Grid<'_> {
     /// Mean squared amplitude, at each order, of noise as white and with as long a memory (in rows, first-order
     /// autoregressive) as what is `left`, from surrogates in the places of the rows (Schulz and Mudelsee, Comput.
     /// Geosci. 28, 421, 2002, for REDFIT).
