@@ -3,12 +3,14 @@
 //! Nominal output = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque). Angles are
 //! radians, errors arc-seconds at the output, torque N·m, positive where it turns the output forward.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use flexspline::{FixedMember, GeneratorAngle, PlayState, Table};
+use flexspline::{FixedMember, Table};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::calibrate::{State, steady};
 use crate::measurement::Gear;
 use flexspline_base::toml_file::{Allowed, Refused, Section, TomlFile, from, number, one_of, real, whole};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -18,6 +20,9 @@ use flexspline_mechanics::drive::DriveError;
 /// The farthest that a drive winds up, rad: torques beyond are in another unit. *Source*: 69 arcmin at the ratcheting
 /// torque of the softest drive of the catalogue (CSG-14-80), the largest of 44.
 const FARTHEST_WIND_UP_RAD: f64 = 0.02;
+
+/// Places over a tooth pitch that an error of a table is averaged over. *Guess*: twice its nodes.
+const STEPS_OF_A_PITCH: u32 = 16;
 
 /// Tooth counts of a strain wave drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,20 +199,12 @@ impl Nominal {
         let temperature = f32::midpoint(low, high).clamp(low, high);
         let [from, to] = table.torque_range_n_m();
         let largest = f64::from(from.abs().min(to.abs()));
-        // Mean of the error over a flexspline pitch, after the play has come to rest.
-        let mean = |torque: f64| -> f64 {
-            let mut play = PlayState::unknown();
-            let pitch = std::f64::consts::TAU / f64::from(teeth.flexspline);
-            let (mut sum, steps) = (0.0, 16);
-            for k in 0..4 * steps {
-                let generator = GeneratorAngle::from_rad(f64::from(k) * pitch / f64::from(steps));
-                let said =
-                    table.forward(&mut play, generator.unwrap_or(GeneratorAngle::ZERO), torque as f32, temperature);
-                if k >= 3 * steps {
-                    sum += f64::from(said.transmission_error_rad) / f64::from(steps);
-                }
-            }
-            sum
+        // Mean of the error over a flexspline pitch, moving forward.
+        let mean = |torque_n_m: f64| -> f64 {
+            let step = TAU / f64::from(teeth.flexspline) / f64::from(STEPS_OF_A_PITCH);
+            let at = State { torque_n_m, temperature_c: f64::from(temperature), way: 1.0, ..State::default() };
+            let places = (0..STEPS_OF_A_PITCH).map(|k| State { generator_rad: f64::from(k) * step, ..at });
+            places.map(|at| steady(table, &at, 0.0)).sum::<f64>() / f64::from(STEPS_OF_A_PITCH) / ARCSEC_PER_RAD
         };
         let odd = |torque: f64| 0.5 * (mean(torque) - mean(-torque));
         let at: Vec<f64> = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0].iter().map(|share| share * largest).collect();
@@ -326,8 +323,8 @@ harmonic = {harmonic:?}                 # of the harmonics, of their amplitude; 
 /// Spread assumed where the file gives none: stiffness, backlash, harmonics of drives of one type.
 const USUAL_SPREAD: Spread = Spread { stiffness: 0.03, backlash: 0.05, harmonic: 0.20, harmonic_phase_rad: 0.20 };
 
-/// Temperature at which the numbers of a file hold that gives none, °C.
-const USUAL_TEMPERATURE_C: f64 = 20.0;
+/// Temperature at which numbers hold where none is given, °C.
+pub(crate) const USUAL_TEMPERATURE_C: f64 = 20.0;
 
 /// Every key of the file; those of `nominal.harmonic` are of each entry.
 const KEYS: [&str; 18] = [

@@ -13,6 +13,7 @@
 
 use serde::Serialize;
 
+use super::zero::{BLOCKS, OF_95_OF_BLOCKS};
 use crate::least_squares::{Normal, jackknife};
 use crate::measurement::{Recording, least_and_most, white_noise};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -37,10 +38,6 @@ const SLIPS: f64 = 0.3;
 const HERTZ: f64 = 2.0 / 3.0;
 /// Powers that are looked among. *Guess*.
 const POWERS: [f64; 2] = [0.3, 1.5];
-/// Blocks of a loop that are left out in turn. *Guess*.
-const BLOCKS: usize = 8;
-/// Student's t of one less, 95 %, by definition.
-const OF_95: f64 = 2.365;
 
 /// A figure with the half width of its interval, 95 %, as blocks left out change it; that of the play with what other
 /// laws of the spring change, too.
@@ -234,7 +231,7 @@ impl TorqueLoop {
         let each = (0..BLOCKS).map(|block| found(Some(block))).collect::<Option<Vec<_>>>()?;
         let figure = |k: usize| {
             let without: Vec<f64> = each.iter().map(|found| found[k]).collect();
-            let half_width = OF_95 * jackknife(&without);
+            let half_width = OF_95_OF_BLOCKS * jackknife(&without);
             LoopFigure { value: value[k], half_width: if k == 0 { half_width.hypot(of_laws) } else { half_width } }
         };
         Some(TorqueLoop {
@@ -244,7 +241,11 @@ impl TorqueLoop {
             knee_n_m: knee * most_n_m,
             exponent: figure(1),
             loss_arcsec: figure(2),
-            rejects: (apart.abs() > OF_95 * jackknife(&without)).then_some(if apart > 0.0 { "play" } else { "hertz" }),
+            rejects: (apart.abs() > OF_95_OF_BLOCKS * jackknife(&without)).then_some(if apart > 0.0 {
+                "play"
+            } else {
+                "hertz"
+            }),
         })
     }
 }

@@ -58,7 +58,7 @@ pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
 use together::{Agreement, Starts, ZERO};
 pub(crate) use torque::INSIDE;
 pub use torque::WindUpTorque;
-pub(crate) use zero::Alignment;
+pub(crate) use zero::{Alignment, steady};
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
 const GOLDEN: f64 = 0.618_033_988_749_895;

@@ -5,7 +5,6 @@
 //! its part rises with its order: smooth curves cost little, wrinkles much.
 
 use flexspline_base::units::ARCSEC_PER_RAD;
-use serde::Serialize;
 
 /// Which part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,12 +31,6 @@ pub enum PartName {
     WavesByLoad,
     /// The same by the flank that bears.
     WavesByFlank,
-}
-
-impl Serialize for PartName {
-    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(self.as_str())
-    }
 }
 
 impl PartName {
@@ -137,18 +130,11 @@ impl Scales {
     pub(super) fn most_torque(&self) -> f64 {
         self.torque_n_m[0].abs().max(self.torque_n_m[1].abs()).max(1e-9)
     }
+}
 
-    /// −1 to 1 over the torques recorded.
-    fn torque_share(&self, torque: f64) -> f64 {
-        let [low, high] = self.torque_n_m;
-        (2.0 * (torque.clamp(low, high) - low) / (high - low).max(1e-9) - 1.0).clamp(-1.0, 1.0)
-    }
-
-    /// −1 to 1 over the temperatures recorded.
-    fn temperature_share(&self, temperature: f64) -> f64 {
-        let [low, high] = self.temperature_c;
-        2.0 * (temperature.clamp(low, high) - low) / (high - low).max(1e-9) - 1.0
-    }
+/// −1 to 1 over what was recorded.
+fn share(value: f64, [low, high]: [f64; 2]) -> f64 {
+    2.0 * (value.clamp(low, high) - low) / (high - low).max(1e-9) - 1.0
 }
 
 /// Puts the columns of a part in a state at the end of `to`.
@@ -163,15 +149,15 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
     };
     match part {
         PartName::WindUp => {
-            let ends = chebyshev(scales.torque_share(at.torque_n_m));
+            let ends = chebyshev(share(at.torque_n_m, scales.torque_n_m));
             // No wind-up without a load, where that was recorded.
-            let zero = chebyshev(scales.torque_share(0.0));
+            let zero = chebyshev(share(0.0, scales.torque_n_m));
             to.extend(ends.iter().zip(zero).map(|(value, zero)| value - zero));
             let load = at.torque_n_m.clamp(low, high) / scales.most_torque();
             to.push(load / (load.abs() + LIGHT_LOAD));
         }
         PartName::Play => {
-            let flank = flank(at, scales);
+            let flank = flank(at, scales.friction_n_m);
             // The lag without load, the lag under the largest, and the flank: none of them is negative.
             to.extend([lag * (1.0 - load.abs()), lag * load.abs(), flank]);
         }
@@ -179,16 +165,16 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             of_waves(to)
         }
         PartName::Temperature => {
-            let warm = scales.temperature_share(at.temperature_c);
+            let warm = share(at.temperature_c, scales.temperature_c);
             to.extend([warm, warm * load, warm * lag]);
         }
-        PartName::ReadingDelay(log) if log == at.log => {
-            to.push(at.speed_rad_s / scales.speed_rad_s.max(f64::MIN_POSITIVE));
+        PartName::ReadingDelay(log) => {
+            let own = at.speed_rad_s / scales.speed_rad_s.max(f64::MIN_POSITIVE);
+            to.push(if log == at.log { own } else { 0.0 });
         }
-        PartName::ReadingDelay(_) => to.push(0.0),
         PartName::WavesByLoad | PartName::WavesByFlank => {
             let by_load = part == PartName::WavesByLoad;
-            let factor = if by_load { scales.torque_share(at.torque_n_m) } else { flank(at, scales) };
+            let factor = if by_load { share(at.torque_n_m, scales.torque_n_m) } else { flank(at, scales.friction_n_m) };
             let begin = to.len();
             of_waves(to);
             to[begin..].iter_mut().for_each(|wave| *wave *= factor);
@@ -216,8 +202,8 @@ pub(super) fn wave_angles(
 }
 
 /// The flank that bears: 1 where the load turns the output forward, or it lags without one; else -1.
-pub(super) fn flank(at: &State, scales: &Scales) -> f64 {
-    if at.torque_n_m.abs() > scales.friction_n_m { at.torque_n_m.signum() } else { -at.way }
+pub(super) fn flank(at: &State, friction_n_m: f64) -> f64 {
+    if at.torque_n_m.abs() > friction_n_m { at.torque_n_m.signum() } else { -at.way }
 }
 
 /// The weights of a part's columns in its penalty.
@@ -267,14 +253,10 @@ pub(super) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
     match part {
         PartName::WindUp => BENDS * 200.0,
         PartName::Play => HALF_A_LOST_MOTION_ARCSEC,
-        PartName::GeneratorAngle
-        | PartName::MaterialAngle
-        | PartName::OutputAngle
-        | PartName::WavesByLoad
-        | PartName::WavesByFlank => 15.0,
         PartName::ToothPitch => 3.0,
         PartName::Temperature => 10.0,
         PartName::ReadingDelay(_) => expected_arcsec(part, scales, &[]),
+        _ => 15.0,
     }
 }
 

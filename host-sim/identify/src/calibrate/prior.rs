@@ -5,14 +5,11 @@ use std::path::Path;
 use flexspline::Table;
 
 use super::CalibrationError;
-use super::parts::State;
+use super::parts::{State, flank};
 use super::zero::steady;
 use crate::extension::Model;
-use crate::nominal::{Nominal, Spread};
+use crate::nominal::{Nominal, Spread, USUAL_TEMPERATURE_C};
 use flexspline_mechanics::drive::{DriveError, GeneratorKind};
-
-/// Temperature of a drive that is known by its ratio alone, °C.
-const USUAL_TEMPERATURE_C: f64 = 20.0;
 
 /// Knowledge before a measurement.
 #[derive(Clone)]
@@ -129,9 +126,7 @@ impl<'a> Prior<'a> {
             return steady(table, &State { torque_n_m, ..*at }, self.zero_rad);
         }
         let n = &self.nominal;
-        let loaded = at.torque_n_m != 0.0 && at.torque_n_m.abs() > self.friction_n_m();
-        // In motion without load the output lags.
-        let flank = if loaded { at.torque_n_m.signum() } else { -at.way };
-        n.harmonics_arcsec(at.generator_rad) + n.wind_up_arcsec(at.torque_n_m) + 0.5 * flank * n.backlash_arcsec
+        let play = 0.5 * flank(at, self.friction_n_m()) * n.backlash_arcsec;
+        n.harmonics_arcsec(at.generator_rad) + n.wind_up_arcsec(at.torque_n_m) + play
     }
 }

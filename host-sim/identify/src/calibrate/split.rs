@@ -120,7 +120,7 @@ pub(super) fn recorded_changes(
 ) -> Vec<(PartName, f64)> {
     let [low, high] = model.scales.torque_n_m;
     let winds_up = model.under_arcsec(high, prior) - model.under_arcsec(low, prior) > noise_arcsec;
-    let forward = rows.rows.iter().filter(|row| flank(&row.at, &model.scales) > 0.0).count();
+    let forward = rows.rows.iter().filter(|row| flank(&row.at, model.scales.friction_n_m) > 0.0).count();
     let both = (BOTH_WAYS..=1.0 - BOTH_WAYS).contains(&(forward as f64 / rows.rows.len().max(1) as f64));
     let all = [(PartName::WavesByLoad, winds_up), (PartName::WavesByFlank, both)];
     let waves = ENCODERS.iter().filter_map(|encoder| model.of(encoder.part)).flatten();

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::GOLDEN;
 use super::folds::Row;
-use super::parts::State;
+use super::parts::{State, flank};
 use super::rows::Rows;
 use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::median_of;
@@ -35,8 +35,8 @@ const REPEATS_ARCSEC: f64 = 0.05;
 const LEAST_GAIN: f64 = 0.02;
 const LEAST_BEFORE_SECOND: f64 = 0.005;
 /// Blocks left out in turn, and the half width of 95 % in standard deviations of their number.
-const BLOCKS: usize = 8;
-const OF_95_OF_BLOCKS: f64 = 2.36;
+pub(super) const BLOCKS: usize = 8;
+pub(super) const OF_95_OF_BLOCKS: f64 = 2.365;
 
 /// Phase of a table against logs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,7 +68,7 @@ const AS_LIKELY: f64 = 1.05;
 const ABSOLUTE_RAD: f64 = 180.0 / ARCSEC_PER_RAD;
 
 /// Error of the table in steady motion, arcsec.
-pub(super) fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
+pub(crate) fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
     let direction = if at.way < 0.0 { Direction::Backward } else { Direction::Forward };
     let generator = GeneratorAngle::from_rad(at.generator_rad - zero_rad).unwrap_or(GeneratorAngle::ZERO);
     let error = table.steady_error_rad(generator, at.torque_n_m as f32, at.temperature_c as f32, direction);
@@ -131,14 +131,13 @@ impl<'a> PhaseSearch<'a> {
     pub(super) fn new(says: &'a dyn Fn(f64) -> Vec<f64>, rows: &[&Row], friction_n_m: f64) -> PhaseSearch<'a> {
         let logs = rows.iter().map(|row| row.at.log + 1).max().unwrap_or(0);
         let heaviest = rows.iter().map(|row| row.at.torque_n_m.abs()).fold(1e-9, f64::max);
-        let flank = |at: &State| if at.torque_n_m.abs() > friction_n_m { at.torque_n_m.signum() } else { -at.way };
         let column = |of: &dyn Fn(&State) -> f64| rows.iter().map(|row| of(&row.at)).collect::<Vec<f64>>();
         let zeros = (0..logs).map(|log| column(&|at| f64::from(at.log == log)));
         let others = [
             column(&|at| at.torque_n_m / heaviest),
             column(&|at| (at.torque_n_m / heaviest).powi(3)),
             column(&|at| at.way),
-            column(&flank),
+            column(&|at| flank(at, friction_n_m)),
         ];
         let basis = FreeSpan::default().beyond(zeros.chain(others));
         PhaseSearch { says, values: rows.iter().map(|row| row.measured_arcsec).collect(), basis }
