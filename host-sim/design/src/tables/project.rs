@@ -246,15 +246,16 @@ pub fn from_samples(
     make((&drive.name, drive.hash()), kind, &plan, &snapped, source, SAMPLES, 0.0)
 }
 
-/// The table of samples laid out by a plan, of a drive that is known by its name and hash alone.
+/// The table of samples of a model called `of`, laid out by a plan, of a drive that is known by name and hash alone.
 pub fn from_plan(
     name: &str,
     hash: [u8; 32],
     kind: GeneratorKind,
     plan: &Plan<'_>,
     samples: &[Sample],
-    source: Source,
+    of: &str,
 ) -> Result<MadeTable, TableError> {
+    let source = Source::File { name: of.to_owned(), blake3: blake3::Hash::from(hash).to_hex().to_string() };
     make((name, hash), kind, plan, samples, source, SAMPLES, 0.0)
 }
 

@@ -54,6 +54,7 @@ pub use rows::one_in;
 use rows::{Recorded, Rows, settled};
 use split::SplitWaves;
 pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
+pub(crate) use table::{APART, JUMP_HALF_WIDTH, RIPPLE_NODES};
 
 use together::{Agreement, Starts, ZERO};
 pub(crate) use torque::INSIDE;
@@ -107,7 +108,7 @@ const OTHER_PACE: f64 = 1.25;
 /// squares. *Guess*.
 pub(crate) const TURNS_WITH_THE_OUTPUT: f64 = 0.7;
 /// Temperatures closer than this, K, are one.
-const ONE_TEMPERATURE_K: f64 = 2.0;
+pub(crate) const ONE_TEMPERATURE_K: f64 = 2.0;
 
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]

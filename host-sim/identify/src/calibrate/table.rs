@@ -2,17 +2,18 @@
 
 use std::f64::consts::TAU;
 
-use flexspline::{Direction, GeneratorAngle, Table};
+use flexspline::{Direction, Table};
 use flexspline_make::grid::{MAX_CLAMPED_NODES, jump_intervals};
 use flexspline_make::{Harmonics, MissingDirection, Plan, Sample};
 
 use super::parts::{GENERATOR_ORDERS, OUTPUT_ORDERS, PartName, State, TOOTH_ORDERS};
 use super::prior::Prior;
 use super::rows::Recorded;
+use super::zero::steady;
 use super::{CalibrationError, Model};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{
-    MadeTable, Source, TableError, accepted, dead_zone_n_m, from_plan, places_that_tell_apart, refined,
+    MadeTable, TableError, accepted, dead_zone_n_m, from_plan, places_that_tell_apart, refined,
 };
 
 /// Torque nodes that the choice starts with, evenly over the torques recorded.
@@ -24,16 +25,16 @@ const MISS_ARCSEC: f64 = 0.05;
 const CLEAR_OF_NODES: f64 = 9.0;
 /// Half the width of the jump at the friction, of the friction; and how near to it no other node may lie, of the
 /// friction and of the range.
-const JUMP_HALF_WIDTH: f64 = 0.002;
+pub(crate) const JUMP_HALF_WIDTH: f64 = 0.002;
 const CLEAR_OF_JUMP: [f64; 2] = [0.2, 0.02];
 /// Nodes over a tooth pitch.
-const RIPPLE_NODES: usize = 8;
+pub(crate) const RIPPLE_NODES: usize = 8;
 /// Places where nodes other than the first are sampled: enough for a curve over the pitch.
 const FEW_PLACES: usize = 16;
 /// Places over a turn of the output, at least and at most.
 const PLACES: [usize; 2] = [151, 2003];
 /// Orders that are to be told apart stay apart by so much where the places fold them.
-const APART: f64 = 0.9;
+pub(crate) const APART: f64 = 0.9;
 /// Half-width (rad) below zero that is taken for rounding.
 const NEGATIVE_HALF_WIDTH_RAD: f64 = 1e-7;
 /// Orders of curves.
@@ -43,7 +44,7 @@ const ORDERS: [u16; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
 pub(super) fn make(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Result<MadeTable, CalibrationError> {
     let drive = prior.core_drive()?;
     let temperatures = temperature_nodes(prior, recorded);
-    let has = |part| model.chosen.iter().any(|chosen| chosen.part == part);
+    let has = |part| model.of(part).is_some();
     let curve = |there: bool, orders: &'static [u16]| Harmonics::of(if there { orders } else { &[] });
     let from_table = prior.table.is_some();
     let waves = from_table || !prior.nominal.harmonics.is_empty();
@@ -62,11 +63,7 @@ pub(super) fn make(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Res
             deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         };
         let samples = samples(prior, model, recorded.scales.teeth, torques, &temperatures);
-        let source = Source::File {
-            name: "logs of one unit".to_owned(),
-            blake3: blake3::Hash::from(prior.hash).to_hex().to_string(),
-        };
-        from_plan(&prior.drive, prior.hash, prior.kind, &plan, &samples, source)
+        from_plan(&prior.drive, prior.hash, prior.kind, &plan, &samples, "logs of one unit")
     };
     let first = first_torque_nodes(prior, model, recorded);
     let jumps = jump_intervals(first.len(), |node| first[node]);
@@ -91,35 +88,20 @@ fn misses(trial: Option<&MadeTable>, prior: &Prior<'_>, model: &Model, torque: f
     let Some(table) = trial.and_then(|made| Table::check(&made.image).ok()) else { return f64::INFINITY };
     let mut worst = 0.0_f64;
     for &temperature in temperatures {
-        for direction in [Direction::Forward, Direction::Backward] {
-            let sum: f64 = few_places(prior.nominal.ratio, model.scales.teeth)
-                .map(|generator_rad| {
-                    let said = GeneratorAngle::from_rad(generator_rad)
-                        .and_then(|generator| table.steady_error_rad(generator, torque, temperature, direction))
-                        .map_or(f64::INFINITY, |rad| f64::from(rad) * ARCSEC_PER_RAD);
-                    said - error_arcsec(prior, model, generator_rad, torque, temperature, direction)
-                })
-                .sum();
+        for way in [1.0, -1.0] {
+            let ratio = prior.nominal.ratio;
+            let places = few_places(ratio, model.scales.teeth).map(|psi| state(ratio, psi, [torque, temperature], way));
+            let sum: f64 = places.map(|at| steady(&table, &at, 0.0) - model.says_arcsec(&at, prior)).sum();
             worst = worst.max(sum.abs() / FEW_PLACES as f64);
         }
     }
     worst
 }
 
-/// Sum of the prior and the parts in steady motion, arcsec.
-fn error_arcsec(
-    prior: &Prior<'_>,
-    model: &Model,
-    generator_rad: f64,
-    torque: f32,
-    temperature: f32,
-    direction: Direction,
-) -> f64 {
-    let way = if direction == Direction::Forward { 1.0 } else { -1.0 };
+/// Steady motion under a load and at a temperature.
+fn state(ratio: f64, generator_rad: f64, [torque, temperature]: [f32; 2], way: f64) -> State {
     let (torque_n_m, temperature_c) = (f64::from(torque), f64::from(temperature));
-    let output_rad = generator_rad / prior.nominal.ratio;
-    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way, ..State::default() };
-    model.says_arcsec(&at, prior)
+    State { generator_rad, output_rad: generator_rad / ratio, torque_n_m, temperature_c, way, ..State::default() }
 }
 
 /// Nodes of temperature: what was recorded, or those of the table that was there before.
@@ -152,7 +134,7 @@ fn first_torque_nodes(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> 
     let clear = (CLEAR_OF_JUMP[0] * friction).max(CLEAR_OF_JUMP[1] * (high - low)).min(0.9 * friction);
     // Its own jumps stay where they are; beside another dead zone they are none.
     let own = prior.table.is_some_and(|table| friction <= dead_zone_n_m(table));
-    let play = prior.nominal.backlash_arcsec > 0.0 || model.chosen.iter().any(|chosen| chosen.part == PartName::Play);
+    let play = prior.nominal.backlash_arcsec > 0.0 || model.of(PartName::Play).is_some();
     if !own && play && friction > 0.0 {
         let jumps: Vec<f64> = [-friction, friction].into_iter().filter(|at| *at > low && *at < high).collect();
         let half = JUMP_HALF_WIDTH * friction;
@@ -193,11 +175,11 @@ fn samples(prior: &Prior<'_>, model: &Model, teeth: f64, torques: &[f32], temper
     for (warm, &temperature) in temperatures.iter().enumerate() {
         for (load, &torque) in torques.iter().enumerate() {
             let angles = if warm == 0 && load == middle { &whole_turn } else { &few };
-            for direction in [Direction::Forward, Direction::Backward] {
+            for (way, direction) in [(1.0, Direction::Forward), (-1.0, Direction::Backward)] {
                 for &generator_rad in angles {
-                    let (torque_n_m, temperature_c) = (f64::from(torque), f64::from(temperature));
-                    let error = error_arcsec(prior, model, generator_rad, torque, temperature, direction);
-                    let output_rad = generator_rad / ratio + error / ARCSEC_PER_RAD;
+                    let at = state(ratio, generator_rad, [torque, temperature], way);
+                    let State { torque_n_m, temperature_c, .. } = at;
+                    let output_rad = at.output_rad + model.says_arcsec(&at, prior) / ARCSEC_PER_RAD;
                     samples.push(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad });
                 }
             }

@@ -7,13 +7,14 @@ use flexspline::{Direction, Table};
 use flexspline_make::{Harmonics, MissingDirection, Plan, Sample};
 
 use super::model::Model;
+use crate::calibrate::{APART, JUMP_HALF_WIDTH, ONE_TEMPERATURE_K, RIPPLE_NODES};
 use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER};
 use crate::diagnosis::{Extended, PipelineError, Series, nominal_arcsec};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use crate::synthesize::Sizes;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_design::tables::{MadeTable, Source, from_plan, places_that_tell_apart};
+use flexspline_design::tables::{MadeTable, from_plan, places_that_tell_apart};
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Positions over a whole turn of the output, at least and at most. Fitted are a few dozen numbers at each load.
@@ -21,29 +22,21 @@ const LEAST_POSITIONS: usize = 151;
 const MOST_POSITIONS: usize = 1009;
 /// Orders that a model may have in addition to those fitted: of errors that the clearance rectifies.
 const FURTHER_ORDERS: [u16; 3] = [8, 10, 12];
-/// Orders that are to be distinguished stay apart by so much where the positions fold them.
-const APART: f64 = 0.9;
 /// Tooth meshes of higher order than this are none in the model.
 const MESHES: u16 = 4;
 /// Positions that a session runs through before those that are sampled: the play comes to rest.
 const BEFORE: usize = 40;
-/// Positions of the tooth pitch in a table.
-const RIPPLE_NODES: usize = 8;
 /// Orders fitted: of the generator and of the generator against the output, and of the output.
 const ORDERS: [u16; 5] = [1, 2, 3, 4, 6];
 const OUTPUT_ORDERS: [u16; 2] = [1, 2];
-/// Nodes of the torque axis on each side where no table gives them, how they crowd towards the friction, and half the
-/// width of the jump there, of the friction.
+/// Nodes of the torque axis on each side where no table gives them, and how they crowd towards the friction.
 const TORQUE_STEPS: u32 = 9;
 const CROWDING: f64 = 1.6;
-const JUMP_HALF_WIDTH: f64 = 0.002;
 /// Friction that a model without any is given, of the largest torque: the play needs a torque at which it changes
 /// flanks.
 const LEAST_FRICTION: f64 = 1e-3;
 /// Half-width (rad) below zero that is taken for what the projection leaves.
 const NEGATIVE_HALF_WIDTH_RAD: f64 = 1e-4;
-/// Temperatures closer than this, K, are one.
-const ONE_TEMPERATURE_K: f64 = 2.0;
 
 /// Nodes symmetric about zero: a pair at either side of the friction, where the flank changes, and further ones up to
 /// the largest torque.
@@ -191,9 +184,7 @@ impl ExtendedTables<'_> {
             negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
             deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         };
-        let source =
-            Source::File { name: of.to_owned(), blake3: blake3::Hash::from(self.subject.hash).to_hex().to_string() };
-        Ok(from_plan(&self.subject.drive, self.subject.hash, self.subject.kind, &plan, &samples, source)?)
+        Ok(from_plan(&self.subject.drive, self.subject.hash, self.subject.kind, &plan, &samples, of)?)
     }
 
     /// Steady motion both ways through a whole turn of the output at every node.
