@@ -119,70 +119,23 @@ impl Serialize for Effect {
     }
 }
 
-/// An effect that cannot be asked for, or not with this parameter.
+/// An effect that cannot be asked for, or not with this parameter: the text found and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum EffectError {
-    /// No effect has this name.
-    #[error("found \"{found}\"{}; allowed: {}", did_you_mean("; ", found, allowed.iter().copied()), allowed.join(", "))]
-    Name {
-        /// The name found.
-        found: String,
-        /// Those that there are.
-        allowed: Vec<&'static str>,
-    },
-    /// The effect has no such parameter.
-    #[error(
-        "{effect}: found parameter \"{found}\"{}; allowed: {}",
-        did_you_mean("; ", found, allowed.iter().copied()),
-        if allowed.is_empty() { "no parameter".to_owned() } else { allowed.join(", ") }
-    )]
-    Parameter {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter found.
-        found: String,
-        /// Those that it has.
-        allowed: Vec<&'static str>,
-    },
-    /// No parameter with a value.
-    #[error("{effect}: found \"{found}\"; allowed: parameter=value")]
-    NoValue {
-        /// The effect.
-        effect: &'static str,
-        /// The text found.
-        found: String,
-    },
-    /// A parameter that stands there twice.
-    #[error("{effect}: {parameter} is given twice")]
-    Twice {
-        /// The effect.
-        effect: &'static str,
-        /// Its parameter.
-        parameter: ParameterName,
-    },
-    /// Two forms of the same parameter.
-    #[error("{effect}: {} and {} say the same; give one of them", both[0], both[1])]
-    BothForms {
-        /// The effect.
-        effect: &'static str,
-        /// Its parameters.
-        both: [ParameterName; 2],
-    },
-    /// A value out of range, or that does not fit the data.
-    #[error("{effect}: {parameter}: found {found}, allowed: {allowed}")]
-    Value {
-        /// The effect.
-        effect: &'static str,
-        /// Its parameter.
-        parameter: ParameterName,
-        /// The value found.
-        found: String,
-        /// The values that are allowed.
-        allowed: String,
-    },
-    /// The effect is one of teeth.
-    #[error("the model gives a ratio and no teeth; this effect needs them")]
-    NoTeeth,
+#[error("{0}")]
+pub struct EffectError(String);
+
+impl EffectError {
+    /// Of a drive that is known by its ratio alone.
+    fn no_teeth() -> EffectError {
+        EffectError("the model gives a ratio and no teeth; this effect needs them".to_owned())
+    }
+
+    /// A name that is none of those `allowed`, with the one that may be meant.
+    fn unknown(what: &str, found: &str, allowed: &[&str]) -> EffectError {
+        let hint = did_you_mean("; ", found, allowed.iter().copied());
+        let allowed = if allowed.is_empty() { "no parameter".to_owned() } else { allowed.join(", ") };
+        EffectError(format!("{what}\"{found}\"{hint}; allowed: {allowed}"))
+    }
 }
 
 /// Reads `NAME` or `NAME:param=value,...`.
@@ -193,16 +146,16 @@ pub fn parse(text: &str) -> Result<Effect, EffectError> {
     let (name, rest) = text.split_once(':').unwrap_or((text, ""));
     let all = effects();
     let Some(definition) = all.iter().find(|effect| effect.name() == name) else {
-        return Err(EffectError::Name { found: name.to_owned(), allowed: all.iter().map(Definition::name).collect() });
+        return Err(EffectError::unknown("found ", name, &all.iter().map(Definition::name).collect::<Vec<_>>()));
     };
     let mut effect = Effect::of(*definition);
     for part in rest.split(',').filter(|part| !part.trim().is_empty()) {
-        let found = || EffectError::NoValue { effect: definition.name(), found: part.to_owned() };
-        let (key, value) = part.split_once('=').ok_or_else(found)?;
+        let no_value = || EffectError(format!("{name}: found \"{part}\"; allowed: parameter=value"));
+        let (key, value) = part.split_once('=').ok_or_else(no_value)?;
         effect.set(key.trim(), value.trim())?;
     }
     match definition.twins.iter().find(|(a, b, _)| effect.given(*a).is_some() && effect.given(*b).is_some()) {
-        Some((a, b, _)) => Err(EffectError::BothForms { effect: definition.name(), both: [*a, *b] }),
+        Some((a, b, _)) => Err(EffectError(format!("{name}: {a} and {b} say the same; give one of them"))),
         None => Ok(effect),
     }
 }
@@ -234,11 +187,11 @@ impl Effect {
     fn set(&mut self, key: &str, text: &str) -> Result<(), EffectError> {
         let (effect, parameters) = (self.definition.name(), self.definition.parameters);
         let Some(parameter) = parameters.iter().find(|parameter| parameter.name.as_str() == key) else {
-            let allowed = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-            return Err(EffectError::Parameter { effect, found: key.to_owned(), allowed });
+            let allowed: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+            return Err(EffectError::unknown(&format!("{effect}: found parameter "), key, &allowed));
         };
         if self.given(parameter.name).is_some() {
-            return Err(EffectError::Twice { effect, parameter: parameter.name });
+            return Err(EffectError(format!("{effect}: {} is given twice", parameter.name)));
         }
         let word = parameter.words.iter().position(|word| *word == text).map(|k| k as f64);
         self.put(parameter, word.or_else(|| text.parse().ok()), text)
@@ -249,14 +202,14 @@ impl Effect {
         let [low, high] = parameter.range;
         let whole = !parameter.words.is_empty() || [Name::Harmonic, Name::Tooth].contains(&parameter.name);
         let allowed = |value: &f64| *value >= low && *value <= high && (!whole || value.fract() == 0.0);
-        let refuse = || EffectError::Value {
-            effect: self.definition.name(),
-            parameter: parameter.name,
-            found: found.to_owned(),
-            allowed: parameter.allowed(),
-        };
-        self.values.insert(parameter.name, value.filter(allowed).ok_or_else(refuse)?);
+        let refused = || self.refused(parameter.name, found, &parameter.allowed());
+        self.values.insert(parameter.name, value.filter(allowed).ok_or_else(refused)?);
         Ok(())
+    }
+
+    /// A value that is out of range, or does not fit the data.
+    fn refused(&self, parameter: ParameterName, found: &str, allowed: &str) -> EffectError {
+        EffectError(format!("{}: {parameter}: found {found}, allowed: {allowed}", self.definition.name()))
     }
 
     /// The value of a parameter, if it has one.
@@ -299,17 +252,15 @@ impl Effect {
                 _ => None,
             };
         }
-        let refuse = |parameter, found: f64, allowed| {
-            Err(EffectError::Value { effect: self.definition.name(), parameter, found: found.to_string(), allowed })
-        };
         let [first, last] = setting.span();
         if let Some(time) = complete.given(Name::TimeS).filter(|time| !(*time > first && *time < last)) {
-            return refuse(Name::TimeS, time, format!("within the data, {first:.2} to {last:.2}"));
+            let allowed = format!("within the data, {first:.2} to {last:.2}");
+            return Err(self.refused(Name::TimeS, &time.to_string(), &allowed));
         }
         if let (Some(tooth), Some(wheel)) = (self.given(Name::Tooth), complete.given(Name::Wheel)) {
             let teeth = setting.teeth(wheel)?;
             if tooth >= teeth {
-                return refuse(Name::Tooth, tooth, format!("0 to {}", teeth - 1.0));
+                return Err(self.refused(Name::Tooth, &tooth.to_string(), &format!("0 to {}", teeth - 1.0)));
             }
         }
         Ok(complete)
@@ -345,12 +296,12 @@ impl<'a> Setting<'a> {
     }
 
     fn teeth(&self, wheel: f64) -> Result<f64, EffectError> {
-        let teeth = self.nominal.teeth.ok_or(EffectError::NoTeeth)?;
+        let teeth = self.nominal.teeth.ok_or_else(EffectError::no_teeth)?;
         Ok(f64::from(if wheel == 0.0 { teeth.flexspline } else { teeth.circular_spline }))
     }
 
     fn tooth_pitch_arcsec(&self) -> Result<f64, EffectError> {
-        Ok(ARCSEC_PER_TURN / f64::from(self.nominal.teeth.ok_or(EffectError::NoTeeth)?.of_output()))
+        Ok(ARCSEC_PER_TURN / f64::from(self.nominal.teeth.ok_or_else(EffectError::no_teeth)?.of_output()))
     }
 
     fn factor(&self, factor: Factor, effect: &Effect) -> Result<f64, EffectError> {
