@@ -10,7 +10,7 @@ pub(crate) mod spec;
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use thiserror::Error;
 
 use crate::diagnosis::candidate::{dynamic, geometry, lobes, sensor, stiffness, thermal};
@@ -22,7 +22,8 @@ pub(crate) use spec::OF_THE_OUTPUT_ENCODER;
 table! {
     /// A physical cause of the library.
     #[allow(missing_docs, reason = "the properties of each say what it is")]
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+    #[serde(rename_all = "snake_case")]
     pub enum CauseName: &'static CauseSpec {
         CircularSplineEccentricity = &geometry::CIRCULAR_SPLINE_ECCENTRICITY,
         FlexsplineRunout = &geometry::FLEXSPLINE_RUNOUT,
@@ -190,12 +191,6 @@ impl FromStr for CauseName {
 impl fmt::Display for CauseName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.as_str())
-    }
-}
-
-impl Serialize for CauseName {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.as_str())
     }
 }
 

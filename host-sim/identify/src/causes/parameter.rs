@@ -3,12 +3,13 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 table! {
     /// The name of a parameter; the unit is its end.
     #[allow(missing_docs, reason = "the names say it")]
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+    #[serde(rename_all = "snake_case")]
     pub enum ParameterName: (&'static str, Kind) {
         AmplitudeArcsec = ("amplitude_arcsec", Kind::Size),
         AmplitudeUm = ("amplitude_um", Kind::Other),
@@ -96,12 +97,6 @@ impl ParameterName {
 impl fmt::Display for ParameterName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.as_str())
-    }
-}
-
-impl Serialize for ParameterName {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.as_str())
     }
 }
 
