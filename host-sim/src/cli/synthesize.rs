@@ -111,14 +111,6 @@ struct NominalSource {
     drive: String,
 }
 
-/// The unit, as `truth.json` has it.
-#[derive(Debug, Serialize)]
-struct UnitTruth {
-    wind_up_over_nominal: f64,
-    clearance_over_nominal: f64,
-    zero_arcsec: f64,
-}
-
 /// `truth.json`.
 #[derive(Debug, Serialize)]
 struct Truth {
@@ -128,10 +120,9 @@ struct Truth {
     effects: Vec<Effect>,
     data_faults: Vec<Effect>,
     nominal: NominalSource,
-    unit: UnitTruth,
-    noise_arcsec: f64,
-    wander_arcsec: f64,
-    encoder_bits: u32,
+    unit: DrawnUnit,
+    #[serde(flatten)]
+    sensors: Sensors,
     sessions: usize,
     rows: usize,
 }
@@ -179,14 +170,8 @@ impl Synthesize {
             effects,
             data_faults,
             nominal: source,
-            unit: UnitTruth {
-                wind_up_over_nominal: unit.wind_up,
-                clearance_over_nominal: unit.clearance,
-                zero_arcsec: unit.zero_arcsec,
-            },
-            noise_arcsec: self.noise_arcsec,
-            wander_arcsec: self.wander_arcsec,
-            encoder_bits: sensors.encoder_bits,
+            unit,
+            sensors,
             sessions: made.sessions.len(),
             rows: made.sessions.iter().map(Session::len).sum(),
         };

@@ -19,6 +19,7 @@ pub use excitation::{MotionPlan, completed, within_temperatures};
 
 use flexspline::Table;
 use flexspline_mechanics::drive::Drive;
+use serde::Serialize;
 
 use catalogue::Setting;
 
@@ -31,13 +32,15 @@ use crate::nominal::Nominal;
 use flexspline_base::units::{ARCSEC_PER_RAD, ARCSEC_PER_TURN};
 
 /// How noisy the sensors are.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct Sensors {
     /// White noise, arcsec.
+    #[serde(rename = "noise_arcsec")]
     pub white_arcsec: f64,
     /// Wander, arcsec rms.
     pub wander_arcsec: f64,
     /// Time scale of the wander, s.
+    #[serde(skip)]
     pub wander_s: f64,
     /// Resolution of the output encoder, bits to a turn.
     pub encoder_bits: u32,
@@ -92,13 +95,16 @@ impl Sizes {
 }
 
 /// One unit: its deviations from the drawing.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DrawnUnit {
     /// Wind-up over nominal.
+    #[serde(rename = "wind_up_over_nominal")]
     pub wind_up: f64,
     /// Clearance over nominal.
+    #[serde(rename = "clearance_over_nominal")]
     pub clearance: f64,
     /// The drive with these factors, and harmonics of its own.
+    #[serde(skip)]
     drive: Nominal,
     /// Zero of the output encoder, arcsec.
     pub zero_arcsec: f64,
