@@ -79,23 +79,17 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// A mapping that cannot be used.
+/// Options that say no mapping: what was found and what is allowed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("--columns: {0}; for instance --columns generator=wave_gen_turns:turn,error=error_arcsec:arcsec")]
+#[error("{0}")]
 pub struct MappingError(String);
 
-/// Options that say no mapping.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum OptionError {
-    /// The mapping.
-    #[error(transparent)]
-    Columns(#[from] MappingError),
-    /// The rate of rows.
-    #[error("--rate: found {0}, allowed: a rate above zero, Hz")]
-    Rate(f64),
-    /// The torque at the output for an ampere.
-    #[error("--torque-constant: found {0}, allowed: a number other than zero, N.m for an ampere")]
-    TorqueConstant(f64),
+impl MappingError {
+    fn of_columns(what: impl fmt::Display) -> MappingError {
+        MappingError(format!(
+            "--columns: {what}; for instance --columns generator=wave_gen_turns:turn,error=error_arcsec:arcsec"
+        ))
+    }
 }
 
 /// Names and units of columns where they differ from
@@ -146,12 +140,14 @@ impl ColumnMap {
     ///
     /// # Errors
     /// The first that says nothing that can be used.
-    pub fn of_options(columns: &str, rate_hz: Option<f64>, per_ampere: Option<f64>) -> Result<ColumnMap, OptionError> {
+    pub fn of_options(columns: &str, rate_hz: Option<f64>, per_ampere: Option<f64>) -> Result<ColumnMap, MappingError> {
         if let Some(constant) = per_ampere.filter(|constant| !(constant.is_finite() && *constant != 0.0)) {
-            return Err(OptionError::TorqueConstant(constant));
+            return Err(MappingError(format!(
+                "--torque-constant: found {constant}, allowed: a number other than zero, N.m for an ampere"
+            )));
         }
         if let Some(rate) = rate_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-            return Err(OptionError::Rate(rate));
+            return Err(MappingError(format!("--rate: found {rate}, allowed: a rate above zero, Hz")));
         }
         let given =
             if columns.is_empty() { Vec::new() } else { ColumnMap::with_torque_constant(columns, per_ampere)?.given };
@@ -165,10 +161,12 @@ impl ColumnMap {
             let (name, column) = (given.quantity, &given.column);
             match map.given.iter().find(|other| other.quantity == name || other.column == *column) {
                 Some(before) if before.quantity == name => {
-                    return Err(MappingError(format!("{name} is there twice")));
+                    return Err(MappingError::of_columns(format!("{name} is there twice")));
                 }
                 Some(GivenColumn { quantity, .. }) => {
-                    return Err(MappingError(format!("column {column} stands for both {quantity} and {name}")));
+                    return Err(MappingError::of_columns(format!(
+                        "column {column} stands for both {quantity} and {name}"
+                    )));
                 }
                 None => map.given.push(given),
             }
@@ -278,14 +276,14 @@ impl ColumnMap {
 
 /// One entry of a mapping.
 fn given(entry: &str, per_ampere: Option<f64>) -> Result<GivenColumn, MappingError> {
-    let (name, column) = entry
-        .split_once('=')
-        .ok_or_else(|| MappingError(format!("found \"{entry}\", allowed: name=column:unit, separated by commas")))?;
+    let (name, column) = entry.split_once('=').ok_or_else(|| {
+        MappingError::of_columns(format!("found \"{entry}\", allowed: name=column:unit, separated by commas"))
+    })?;
     let name = name.trim();
     let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name).ok_or_else(|| {
         let names = Quantity::ALL.map(Quantity::name);
         let hint = did_you_mean("; ", name, names);
-        MappingError(format!("found the name \"{name}\", allowed: {}{hint}", names.join(", ")))
+        MappingError::of_columns(format!("found the name \"{name}\", allowed: {}{hint}", names.join(", ")))
     })?;
     let (column, reading) = match column.rsplit_once(':') {
         None => {
@@ -295,10 +293,12 @@ fn given(entry: &str, per_ampere: Option<f64>) -> Result<GivenColumn, MappingErr
         }
         Some((column, unit)) => (column, Reading::parse(unit, quantity.family(), per_ampere).map(Some)),
     };
-    let reading = reading.map_err(|wrong| MappingError(format!("{name}: {}", quantity.refusal(wrong))))?;
+    let reading = reading.map_err(|wrong| MappingError::of_columns(format!("{name}: {}", quantity.refusal(wrong))))?;
     let column = column.trim().to_owned();
     if column.is_empty() {
-        return Err(MappingError(format!("{name}: found no column, allowed: the name of a column of the file")));
+        return Err(MappingError::of_columns(format!(
+            "{name}: found no column, allowed: the name of a column of the file"
+        )));
     }
     Ok(GivenColumn { quantity, column, reading })
 }
