@@ -8,8 +8,8 @@ use thiserror::Error;
 use super::columns::{ColumnMap, MappedColumn, Quantity};
 use super::fault::{Fault, FaultName, Treatment};
 use super::faults::Findings;
-use super::phd2;
 use super::reader::{Cells, Columns, Layout, Sheet, clock, stamps};
+use super::{Session, phd2};
 use flexspline_base::csv_rows::TableProblem;
 
 /// Fewest rows that say anything about noise or an order. *Guess*: fewer give no standard deviation to speak of.
@@ -51,6 +51,16 @@ pub(crate) struct Log {
     /// Session of each row; empty as long as there is one.
     pub session: Vec<u32>,
     columns: [Option<Vec<f64>>; 7],
+    /// Whether the error was recorded, and no output angle.
+    pub(super) error_recorded: bool,
+    /// Noise of each row against that of a row of mean worth, where rows differ.
+    pub(super) loudness: Option<Vec<f64>>,
+    /// Time by which one angle may be read before the other on the mean, s.
+    pub(super) unsure_s: f64,
+    /// Step of the resolution at the output where no noise blurs it, rad; else 0.
+    pub(super) coarse_rad: f64,
+    /// Sessions of another zero, and what was taken off each, rad.
+    pub(super) zeros: Vec<(u32, f64)>,
 }
 
 impl Log {
@@ -74,6 +84,51 @@ impl Log {
         self.columns[quantity as usize] = Some(values);
     }
 
+    /// A channel that every log has, or nothing.
+    pub(super) fn of(&self, quantity: Quantity) -> &[f64] {
+        self.get(quantity).unwrap_or_default()
+    }
+
+    /// With the error in place of an output angle.
+    pub(super) fn with_error(mut self, ratio: f64) -> Log {
+        self.error_recorded = self.get(Quantity::Output).is_none();
+        if let Some(mut error) = self.take(Quantity::Output) {
+            error.iter_mut().zip(self.of(Quantity::Generator)).for_each(|(error, psi)| *error -= psi / ratio);
+            self.put(Quantity::Error, error);
+        }
+        self
+    }
+
+    /// The output angle by generator and error, rad.
+    pub(super) fn output_rad(&self, ratio: f64) -> Vec<f64> {
+        let rows = self.of(Quantity::Generator).iter().zip(self.of(Quantity::Error));
+        rows.map(|(generator, error)| generator / ratio + error).collect()
+    }
+
+    /// Its rows as sessions, each with columns of its own.
+    pub(super) fn into_sessions(mut self) -> Vec<Session> {
+        let whole = Session {
+            generator_rad: self.take(Quantity::Generator).unwrap_or_default(),
+            error_rad: self.take(Quantity::Error).unwrap_or_default(),
+            time_s: self.take(Quantity::Time),
+            torque_n_m: self.take(Quantity::Torque),
+            temperature_c: self.take(Quantity::Temperature),
+            orientation_rad: self.take(Quantity::Orientation),
+            loudness: self.loudness.take(),
+            line: self.line.clone(),
+            unsure_s: self.unsure_s,
+            coarse_rad: self.coarse_rad,
+            ..Session::default()
+        };
+        let of = |rows: Range<usize>| {
+            let number = self.number(rows.start);
+            let zero = self.zeros.iter().rfind(|(session, _)| *session <= number);
+            let own_zero = zero.is_some_and(|(session, _)| *session == number);
+            Session { own_zero, zero_off_rad: zero.map_or(0.0, |(_, off)| *off), ..whole.part(rows) }
+        };
+        self.sessions().map(of).collect()
+    }
+
     /// The output angle, or the error where that was recorded.
     pub(crate) fn output_or_error(&self) -> Quantity {
         if self.columns[Quantity::Output as usize].is_some() { Quantity::Output } else { Quantity::Error }
@@ -86,16 +141,55 @@ impl Log {
         Fault::of_rows(name, rows.into_iter().map(at))
     }
 
-    /// Whether a row goes on where the one before it ended.
+    /// The session of a row.
+    pub(super) fn number(&self, row: usize) -> u32 {
+        self.session.get(row).copied().unwrap_or(0)
+    }
+
+    /// Whether a row goes on where the one before it ended; what is behind the last row does not.
     pub(crate) fn continues(&self, row: usize) -> bool {
-        row > 0 && (self.session.is_empty() || self.session[row] == self.session[row - 1])
+        (1..self.len()).contains(&row) && self.number(row) == self.number(row - 1)
+    }
+
+    /// The rows that go on where the ones before them ended.
+    pub(super) fn continued(&self) -> impl Iterator<Item = usize> + '_ {
+        (1..self.len()).filter(|row| self.continues(*row))
+    }
+
+    /// The rows of the session that a row is of.
+    pub(super) fn around(&self, row: usize) -> Range<usize> {
+        let (number, all) = (self.number(row), &self.session);
+        let end = if all.is_empty() { self.len() } else { all.partition_point(|of| *of <= number) };
+        all.partition_point(|of| *of < number)..end
+    }
+
+    /// A series of a value for each row, session by session.
+    pub(super) fn pieces<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = &'a [f64]> {
+        self.sessions().filter_map(|rows| values.get(rows))
+    }
+
+    /// Stretches of rows of a session, `shortest` of them at least, that are the same as the first.
+    pub(super) fn runs(&self, values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
+        let (mut found, mut from) = (Vec::new(), 0);
+        for row in 1..=values.len() {
+            if !self.continues(row) || !same(values[row], values[from]) {
+                found.push(std::mem::replace(&mut from, row)..row);
+            }
+        }
+        found.retain(|run: &Range<usize>| run.len() >= shortest);
+        found
     }
 
     /// The rows of each session.
     pub(crate) fn sessions(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         let mut begin = 0;
-        let ends = (1..=self.len()).filter(|row| *row == self.len() || !self.continues(*row));
+        let ends = (1..=self.len()).filter(|row| !self.continues(*row));
         ends.map(move |end| std::mem::replace(&mut begin, end)..end)
+    }
+
+    /// Whether a row says what the one before says, in every column.
+    pub(super) fn repeats(&self, row: usize) -> bool {
+        self.columns.iter().flatten().all(|values| values[row].total_cmp(&values[row - 1]).is_eq())
     }
 
     /// Begins a session at these rows, in rising order, in addition to those that begin already.
@@ -113,7 +207,7 @@ impl Log {
     pub(crate) fn leave_out(&mut self, drop: &[bool]) {
         self.line = kept(&self.line, drop);
         self.session = kept(&self.session, drop);
-        self.columns.iter_mut().flatten().for_each(|values| *values = kept(values, drop));
+        self.columns.iter_mut().chain([&mut self.loudness]).flatten().for_each(|values| *values = kept(values, drop));
     }
 }
 
@@ -122,17 +216,8 @@ pub(super) fn kept<T: Copy>(values: &[T], drop: &[bool]) -> Vec<T> {
     values.iter().zip(drop).filter(|(_, drop)| !**drop).map(|(value, _)| *value).collect()
 }
 
-/// A file as it was read.
-pub(super) struct LogFile {
-    pub log: Log,
-    /// The columns in use; none of a guide log, whose numbers need no mapping.
-    pub columns: Vec<MappedColumn>,
-    /// Whether each session has a zero of its own.
-    pub own_zeros: bool,
-}
-
-/// Reads a file called `file`, of at least `fewest` rows; `ratio` is that of the axis of a guide log, which says no
-/// generator angle.
+/// Reads a file called `file`, of at least `fewest` rows, with its columns in use: none of a guide log, whose numbers
+/// need no mapping, and which says no generator angle, so that `ratio` is that of its axis.
 pub(super) fn read(
     file: &str,
     bytes: Vec<u8>,
@@ -140,10 +225,10 @@ pub(super) fn read(
     ratio: f64,
     fewest: usize,
     findings: &mut Findings,
-) -> Result<LogFile, MeasuredError> {
+) -> Result<(Log, Vec<MappedColumn>), MeasuredError> {
     let refuse = |problem: TableProblem| MeasuredError::at(file, problem);
     if phd2::is_one(&bytes) {
-        return guide_log(&bytes, map, ratio, findings).map_err(refuse);
+        return guide_log(&bytes, map, ratio, findings).map(|log| (log, Vec::new())).map_err(refuse);
     }
     let sheet = Sheet::of(bytes, &map.known()).map_err(refuse)?;
     let layout = &sheet.layout;
@@ -154,7 +239,7 @@ pub(super) fn read(
     findings.notes.extend(sheet.notes.iter().chain(&read.notes).cloned());
     match of_columns(layout, read, &columns, map.rate_hz, fewest, findings) {
         (_, Some(problem)) => Err(refuse(problem)),
-        (log, None) => Ok(LogFile { log, columns, own_zeros: false }),
+        (log, None) => Ok((log, columns)),
     }
 }
 
@@ -230,7 +315,7 @@ pub(crate) fn of_columns(
     (log, refused)
 }
 
-fn guide_log(bytes: &[u8], map: &ColumnMap, ratio: f64, findings: &mut Findings) -> Result<LogFile, TableProblem> {
+fn guide_log(bytes: &[u8], map: &ColumnMap, ratio: f64, findings: &mut Findings) -> Result<Log, TableProblem> {
     if *map != ColumnMap::default() {
         let what = "a guide log of PHD2 has columns and times of its own, found --columns or --rate; allowed: neither"
             .to_owned();
@@ -242,7 +327,7 @@ fn guide_log(bytes: &[u8], map: &ColumnMap, ratio: f64, findings: &mut Findings)
         return Err(TableProblem { line: 1, what });
     }
     findings.notes.extend(notes);
-    Ok(LogFile { log, columns: Vec::new(), own_zeros: true })
+    Ok(log)
 }
 
 /// Refuses rows that end before a column in use, or have more fields than names.
@@ -288,28 +373,16 @@ fn within_limits(column: &MappedColumn, numbers: &[f64], lines: &[u64]) -> Resul
     Err(TableProblem { line: lines[row], what })
 }
 
-/// Rows in the order of their time, each once.
+/// Rows in the order of their time.
 fn in_order(log: &mut Log, findings: &mut Findings) {
-    let mended = |log: &Log, findings: &mut Findings, what: String| {
-        let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
-        let fault = Fault::new(FaultName::ClockError, lines, log.len() as u64);
-        findings.add(Some(fault), Quantity::Time, Treatment::Repaired, |_| what);
-    };
-    if let Some((order, note)) = log.get(Quantity::Time).and_then(stamps::order) {
-        log.line = order.iter().map(|row| log.line[*row]).collect();
-        for values in log.columns.iter_mut().flatten() {
-            *values = order.iter().map(|row| values[*row]).collect();
-        }
-        mended(log, findings, note);
+    let Some((order, note)) = log.get(Quantity::Time).and_then(stamps::order) else { return };
+    log.line = order.iter().map(|row| log.line[*row]).collect();
+    for values in log.columns.iter_mut().flatten() {
+        *values = order.iter().map(|row| values[*row]).collect();
     }
-    if log.get(Quantity::Time).is_none() {
-        return;
-    }
-    let columns: Vec<&[f64]> = log.columns.iter().flatten().map(Vec::as_slice).collect();
-    if let Some((drop, note)) = stamps::twice(&columns) {
-        log.leave_out(&drop);
-        mended(log, findings, note);
-    }
+    let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
+    let fault = Fault::new(FaultName::ClockError, lines, log.len() as u64);
+    findings.add(Some(fault), Quantity::Time, Treatment::Repaired, |_| note);
 }
 
 /// A time of day goes on where a day ends.

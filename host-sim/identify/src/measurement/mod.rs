@@ -38,7 +38,7 @@ pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 pub(crate) use unit::{Family, WrongReading};
 
 use faults::Findings;
-use log::{Log, LogFile};
+use log::Log;
 use raw::RawFile;
 
 /// More sessions than a person makes. *Guess*.
@@ -127,24 +127,6 @@ impl Session {
         self.generator_rad.iter().enumerate().map(state)
     }
 
-    /// The column of torque or temperature, else that of the orientation.
-    fn column_mut(&mut self, channel: Quantity) -> &mut Option<Vec<f64>> {
-        match channel {
-            Quantity::Torque => &mut self.torque_n_m,
-            Quantity::Temperature => &mut self.temperature_c,
-            _ => &mut self.orientation_rad,
-        }
-    }
-
-    /// Torque or temperature, else the orientation, where recorded.
-    fn column(&self, channel: Quantity) -> Option<&[f64]> {
-        match channel {
-            Quantity::Torque => self.torque_n_m.as_deref(),
-            Quantity::Temperature => self.temperature_c.as_deref(),
-            _ => self.orientation_rad.as_deref(),
-        }
-    }
-
     /// With these lines, and each of its columns of numbers changed by `of`.
     fn each(&self, line: Vec<u64>, of: impl Fn(&[f64]) -> Vec<f64>) -> Session {
         let recorded = |values: &Option<Vec<f64>>| values.as_deref().map(&of);
@@ -159,11 +141,6 @@ impl Session {
             loudness: recorded(&self.loudness),
             ..*self
         }
-    }
-
-    /// Leaves out the rows for which `drop` is true.
-    pub(crate) fn leave_out(&mut self, drop: &[bool]) {
-        *self = self.each(log::kept(&self.line, drop), |values| log::kept(values, drop));
     }
 
     /// Some of its rows as a session.
@@ -288,41 +265,39 @@ pub(crate) fn parse_at_least(
         return Err(refuse(Refusal::NoRatio(gear.ratio)));
     }
     let mut findings = Findings::default();
-    let LogFile { mut log, columns, own_zeros } =
-        log::read(file, bytes.into(), columns, gear.ratio, fewest, &mut findings)?;
+    let (mut log, columns) = log::read(file, bytes.into(), columns, gear.ratio, fewest, &mut findings)?;
     let rows = log.len();
     let recorded = in_order(&mut log, &columns, &mut findings).map_err(refuse)?;
     enough(&log, recorded, fewest).map_err(refuse)?;
     rollover::unwrap(&mut log, &columns, gear.ratio, &mut findings.notes);
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &columns, gear, &mut findings).map_err(refuse)?;
-    let error_recorded = log.output_or_error() == Quantity::Error;
     // A drift over long gaps looks like other zeros.
     let drifts = faults::leaps::has_other_zeros(&log, gear)
-        && faults::drift::slope(&into_sessions(log.clone(), gear.ratio), gear).is_some();
-    let other_zeros = if drifts { Vec::new() } else { faults::leaps::between_sessions(&mut log, gear, &mut findings) };
+        && faults::drift::slope(&log.clone().with_error(gear.ratio), gear).is_some();
+    if !drifts {
+        faults::leaps::between_sessions(&mut log, gear, &mut findings);
+    }
     faults::stalls::check(&mut log, gear, &mut findings);
-    let mut sessions = into_sessions(log, gear.ratio);
-    findings.notes.extend(many_sessions(&sessions));
-    for (session, off_rad) in other_zeros {
-        sessions[session].own_zero = true;
-        sessions[session..].iter_mut().for_each(|later| later.zero_off_rad = off_rad);
-    }
-    sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= own_zeros);
+    let mut log = log.with_error(gear.ratio);
+    findings.notes.extend(many_sessions(&log));
     if drifts {
-        faults::drift::check(&mut sessions, gear, &mut findings);
+        faults::drift::check(&mut log, gear, &mut findings);
     }
-    faults::held::check(&mut sessions, gear, &mut findings);
-    faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
-    faults::coarse_torque::check(&mut sessions, &mut findings);
-    faults::reads::check(&mut sessions, gear, &mut findings);
-    faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
-    faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
-    faults::steps::check(&mut sessions, gear, &mut findings);
+    faults::held::check(&mut log, gear, &mut findings);
+    faults::frozen::check(&mut log, gear, &mut findings).map_err(refuse)?;
+    faults::held::check_coarse_torque(&mut log, &mut findings);
+    faults::reads::check(&mut log, gear, &mut findings);
+    faults::outliers::check(&mut log, gear, &mut findings);
+    faults::resolution::check(&mut log, gear, &mut findings);
+    faults::steps::check(&mut log, gear, &mut findings);
     // Steps that stay in the data look like drift.
     if findings.tooth_steps.is_empty() && !drifts {
-        faults::drift::check(&mut sessions, gear, &mut findings);
+        faults::drift::check(&mut log, gear, &mut findings);
     }
+    let mut sessions = log.into_sessions();
+    // Each session of a guide log, whose columns nobody maps, has its own zero.
+    sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= columns.is_empty());
     let Findings { mut faults, tooth_steps, notes } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
@@ -402,40 +377,15 @@ fn enough(log: &Log, recorded: String, fewest: usize) -> Result<(), Refusal> {
 }
 
 /// Note where the stamps part the rows into sessions of hardly any rows.
-fn many_sessions(sessions: &[Session]) -> Option<String> {
-    let rows: usize = sessions.iter().map(Session::len).sum();
-    (sessions.len() > MANY_SESSIONS && rows < FEWEST_ROWS * sessions.len()).then(|| {
+fn many_sessions(log: &Log) -> Option<String> {
+    let (rows, sessions) = (log.len(), log.sessions().count());
+    (sessions > MANY_SESSIONS && rows < FEWEST_ROWS * sessions).then(|| {
         format!(
-            "{} sessions of {} rows on the mean: time that steps by more than {SESSION_GAP_PERIODS} of its usual \
-             steps, or back, begins one; are the stamps those of the rows?",
-            sessions.len(),
-            rows / sessions.len()
+            "{sessions} sessions of {} rows on the mean: time that steps by more than {SESSION_GAP_PERIODS} of its \
+             usual steps, or back, begins one; are the stamps those of the rows?",
+            rows / sessions
         )
     })
-}
-
-/// The sessions of a log.
-fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
-    let sessions: Vec<Range<usize>> = log.sessions().collect();
-    let generator = log.take(Quantity::Generator).unwrap_or_default();
-    let error = match log.take(Quantity::Output) {
-        Some(mut output) => {
-            output.iter_mut().zip(&generator).for_each(|(output, generator)| *output -= generator / ratio);
-            output
-        }
-        None => log.take(Quantity::Error).unwrap_or_default(),
-    };
-    let whole = Session {
-        generator_rad: generator,
-        error_rad: error,
-        time_s: log.take(Quantity::Time),
-        torque_n_m: log.take(Quantity::Torque),
-        temperature_c: log.take(Quantity::Temperature),
-        orientation_rad: log.take(Quantity::Orientation),
-        line: std::mem::take(&mut log.line),
-        ..Session::default()
-    };
-    if sessions.len() < 2 { vec![whole] } else { sessions.into_iter().map(|rows| whole.part(rows)).collect() }
 }
 
 #[cfg(test)]
@@ -457,5 +407,36 @@ impl Session {
         self.error_rad.push(error_rad);
         self.time_s.iter_mut().for_each(|all| all.push(time_s));
         self.torque_n_m.iter_mut().for_each(|all| all.push(torque_n_m));
+    }
+
+    /// Leaves out the rows for which `drop` is true.
+    pub(crate) fn leave_out(&mut self, drop: &[bool]) {
+        *self = self.each(log::kept(&self.line, drop), |values| log::kept(values, drop));
+    }
+}
+
+#[cfg(test)]
+impl Log {
+    /// Does something with made-up sessions as one log.
+    pub(crate) fn on<T>(sessions: &mut [Session], check: impl FnOnce(&mut Log) -> T) -> T {
+        let mut log = Log::default();
+        for (number, session) in (0..).zip(&*sessions) {
+            log.line.extend(&session.line);
+            log.session.extend(vec![number; session.len()]);
+        }
+        let flat = |of: fn(&Session) -> Option<&Vec<f64>>| {
+            Some(sessions.iter().filter_map(of).flatten().copied().collect()).filter(|all: &Vec<f64>| !all.is_empty())
+        };
+        for (channel, values) in [
+            (Quantity::Time, flat(|s| s.time_s.as_ref())),
+            (Quantity::Generator, flat(|s| Some(&s.generator_rad))),
+            (Quantity::Error, flat(|s| Some(&s.error_rad))),
+            (Quantity::Torque, flat(|s| s.torque_n_m.as_ref())),
+        ] {
+            values.into_iter().for_each(|values| log.put(channel, values));
+        }
+        let done = check(&mut log);
+        sessions.iter_mut().zip(log.into_sessions()).for_each(|(session, after)| *session = after);
+        done
     }
 }

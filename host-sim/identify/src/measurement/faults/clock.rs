@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::{Findings, marked};
 use crate::measurement::columns::{MappedColumn, Quantity};
-use crate::measurement::fault::{Fault, FaultName, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 use crate::measurement::refusal::Refusal;
 use flexspline_base::robust::{median_and_std, median_of, quantile_of, sampled};
@@ -23,8 +23,8 @@ const MEDIAN_STDS: f64 = 2.0;
 /// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing. *Guess*: a
 /// logger loses fewer than one row in twenty.
 const UNEVEN_SHARE: f64 = 0.05;
-/// Where more steps than this are zero, the clock is coarse; where fewer, rows are repeated. *Guess*: a sound clock
-/// stands in no row, and one that is coarse in every other one or more.
+/// Where more steps than this are zero, the clock is coarse, or rows are written twice; where fewer, some are repeated.
+/// *Guess*: a sound clock stands in no row, and one that is coarse in every other one or more.
 const COARSE_SHARE: f64 = 0.1;
 /// A clock jitters if the second differences of its stamps exceed this share of a period at the median… *Guess*: less
 /// does not matter to any model.
@@ -61,8 +61,10 @@ pub(in crate::measurement) fn check(
     standing(log, findings);
     let Some(period) = period(log) else {
         let all = log.fault(FaultName::ClockError, 0..log.len());
-        let all = all.map(|all| Fault { time_s: None, until_s: None, ..all });
-        findings.add(all, Quantity::Time, Treatment::Masked, |_| "time does not advance: it is not used".to_owned());
+        findings.add(all, Quantity::Time, Treatment::Masked, |fault| {
+            (fault.time_s, fault.until_s) = (None, None);
+            "time does not advance: it is not used".to_owned()
+        });
         log.take(Quantity::Time);
         return Ok(());
     };
@@ -121,7 +123,17 @@ fn standing(log: &mut Log, findings: &mut Findings) {
     }
     let Some(time) = log.get(Quantity::Time) else { return };
     let (rows, mut spread) = (time.len(), time.to_vec());
-    let stands: Vec<usize> = (1..rows).filter(|row| time[*row] == time[*row - 1] && log.continues(*row)).collect();
+    let stands: Vec<usize> = log.continued().filter(|row| time[*row] == time[*row - 1]).collect();
+    let twice: Vec<usize> = stands.iter().copied().filter(|row| log.repeats(*row)).collect();
+    if twice.len() as f64 > COARSE_SHARE * rows as f64 {
+        let fault = log.fault(FaultName::ClockError, twice.iter().copied());
+        findings.add(fault, Quantity::Time, Treatment::Repaired, |fault| {
+            let count = fault.rows;
+            format!("{count} of {rows} rows repeat the row before in every column, its time too: they are left out")
+        });
+        log.leave_out(&marked(rows, twice));
+        return standing(log, findings);
+    }
     let fault = log.fault(FaultName::ClockError, stands.iter().copied());
     if stands.len() as f64 <= COARSE_SHARE * rows as f64 {
         findings.add(fault, Quantity::Time, Treatment::Masked, |fault| {
@@ -187,8 +199,8 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
         findings.notes.push(uneven);
     } else if total > 0 {
         let fault = log.fault(FaultName::MissingSamples, lost.iter().map(|(row, _)| *row));
-        let fault = fault.map(|fault| Fault { rows: total, ..fault });
-        findings.add(fault, Quantity::Time, Treatment::Kept, |_| {
+        findings.add(fault, Quantity::Time, Treatment::Kept, |fault| {
+            fault.rows = total;
             format!(
                 "{total} rows are missing, in up to {places} places: time goes on by more than the usual {period:.6} s"
             )
@@ -318,6 +330,21 @@ mod tests {
         let mut findings = Findings::default();
         check(&mut log, &[], &mut findings).unwrap();
         findings.faults.iter().filter(|fault| fault.name == FaultName::MissingSamples).map(|fault| fault.rows).sum()
+    }
+
+    #[test]
+    fn rows_written_twice_are_left_out_and_those_of_a_coarse_clock_stay() {
+        let left = |of: fn(usize) -> usize| {
+            let mut log = log(400, |row| Some(0.002 * (row / 2) as f64));
+            let angle = (0..400).map(|row| 0.1 * of(row) as f64).collect();
+            log.put(Quantity::Output, vec![0.0; 400]);
+            log.put(Quantity::Generator, angle);
+            let mut findings = Findings::default();
+            check(&mut log, &[], &mut findings).unwrap();
+            (log.len(), findings.faults.len())
+        };
+        assert_eq!(left(|row| row / 2), (200, 1));
+        assert_eq!(left(|row| row), (400, 1));
     }
 
     #[test]

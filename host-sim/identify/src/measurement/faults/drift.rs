@@ -3,13 +3,15 @@
 //! Wear, heat and a falling stiffness move the error too, but not on both flanks alike; a wrong ratio and an eccentric
 //! encoder move it with the angle. Drift is named only where the data distinguish it from them.
 
+use std::ops::Range;
+
 use super::state::{Extra, StateModel};
 use super::steps::largest_torque;
-use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, level, rows_of, throughout};
-use crate::measurement::Session;
+use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, level};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
 use flexspline_base::robust::median_of;
 
 /// Drift of less than this over the whole recording is not looked for, rad. *Guess*: below what most causes do, and
@@ -55,16 +57,13 @@ const LEAP_SHARE: f64 = 0.3;
 const LEVEL_ROWS: usize = 12;
 
 /// Finds a linear drift over the whole recording, names it and takes it out.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    let Some(([total, std], [begin, end])) = slope(sessions, gear) else { return };
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    let Some(([total, std], [begin, end])) = slope(log, gear) else { return };
     let per_s = total / (end - begin);
     let per_hour = 3600.0 * per_s / ARCSEC;
-    let fault = throughout(sessions, FaultName::Drift).map(|fault| Fault {
-        size_arcsec: Some(total / ARCSEC),
-        measures: Measures { arcsec_per_hour: Some(per_hour), ..Measures::default() },
-        ..fault
-    });
-    findings.add(fault, Quantity::Error, Treatment::Repaired, |_| {
+    findings.add(log.fault(FaultName::Drift, 0..log.len()), Quantity::Error, Treatment::Repaired, |fault| {
+        fault.size_arcsec = Some(total / ARCSEC);
+        fault.measures.arcsec_per_hour = Some(per_hour);
         format!(
             "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all \
              {:.2}), alike on both flanks, and not with temperature or position: a straight line in time is taken out",
@@ -72,50 +71,46 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             std / ARCSEC
         )
     });
-    for session in sessions.iter_mut() {
-        if let Some(time) = &session.time_s {
-            session.error_rad.iter_mut().zip(time).for_each(|(error, t)| *error -= per_s * (t - 0.5 * (begin + end)));
-        }
+    if let Some(mut error) = log.take(Quantity::Error) {
+        let time = log.of(Quantity::Time);
+        error.iter_mut().zip(time).for_each(|(error, t)| *error -= per_s * (t - 0.5 * (begin + end)));
+        log.put(Quantity::Error, error);
     }
 }
 
 /// Drift over the whole recording and its standard deviation, rad; when it begins and ends, s.
-pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option<([f64; 2], [f64; 2])> {
-    if sessions.iter().any(|session| session.time_s.is_none() || session.len() < 2) {
-        return None;
-    }
-    let time = |s: usize, r: usize| sessions[s].time_s.as_ref().map_or(0.0, |time| time[r]);
-    let begin = time(0, 0);
-    let end = sessions.len().checked_sub(1).map(|s| time(s, sessions[s].len() - 1))?;
+pub(in crate::measurement) fn slope(log: &Log, gear: &Gear) -> Option<([f64; 2], [f64; 2])> {
+    let time = log.get(Quantity::Time)?;
+    let (begin, end) = (*time.first()?, *time.last()?);
+    let sessions: Vec<Range<usize>> = log.sessions().collect();
     // A clock that was set back gives no common time.
-    let ordered = (1..sessions.len()).all(|s| time(s, 0) >= time(s - 1, sessions[s - 1].len() - 1));
-    if end <= begin || !ordered {
+    let ordered = sessions.windows(2).all(|pair| time[pair[1].start] >= time[pair[0].end - 1]);
+    if sessions.iter().any(|rows| rows.len() < 2) || end <= begin || !ordered {
         return None;
     }
-    let state = StateModel::new(sessions, gear);
-    let forward = |s: usize| (0..sessions[s].len()).filter(|row| state.flank(s, *row) > 0.0).count();
-    let forward = (0..sessions.len()).map(forward).sum::<usize>() as f64 / rows_of(sessions) as f64;
+    let state = StateModel::new(log, gear);
+    let forward = state.flank.iter().filter(|flank| **flank > 0.0).count() as f64 / log.len() as f64;
     if !(BOTH_FLANKS..=1.0 - BOTH_FLANKS).contains(&forward) {
         return None;
     }
-    let tau = |s: usize, r: usize| 2.0 * (time(s, r) - begin) / (end - begin) - 1.0;
-    let by_flank = |s: usize, r: usize| tau(s, r) * state.flank(s, r);
-    let load = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r]);
+    let tau = |row: usize| 2.0 * (time[row] - begin) / (end - begin) - 1.0;
+    let by_flank = |row: usize| tau(row) * state.flank[row];
+    let load = |row: usize| log.get(Quantity::Torque).map_or(0.0, |torque| torque[row]);
     let sign = |load: f64| if load == 0.0 { 0.0 } else { load.signum() };
-    let by_load = |s: usize, r: usize| tau(s, r) * sign(load(s, r));
-    let by_load_size = |s: usize, r: usize| load(s, r) * tau(s, r);
+    let by_load = |row: usize| tau(row) * sign(load(row));
+    let by_load_size = |row: usize| load(row) * tau(row);
     let all: [Extra; 4] = [&tau, &by_flank, &by_load, &by_load_size];
     let fit = state.fit(&all)?;
     let place = fit.value.len() - 4;
     let value = |k: usize| fit.value[place + k];
     let (drift, formal) = (value(0), fit.std[place]);
     // The part that goes with the flank, at the largest torque for the last.
-    let unlike = value(1).abs().max(value(2).abs()).max(value(3).abs() * largest_torque(sessions));
+    let unlike = value(1).abs().max(value(2).abs()).max(value(3).abs() * largest_torque(log));
     if drift.abs() * 2.0 < LEAST_RAD || unlike > ALIKE * drift.abs() {
         return None;
     }
     // Teeth that slip have a trend, too.
-    if largest_leap(sessions) > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
+    if largest_leap(log) > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
         return None;
     }
     // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then
@@ -126,7 +121,8 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
     }
     // Whether the middles of sessions lie on the line: what is left there.
     let on_the_line = || {
-        let lefts: Vec<f64> = (0..sessions.len()).map(|s| median_of(&mut state.left(&fit, s, &all))).collect();
+        let left = state.left(&fit, &all);
+        let lefts: Vec<f64> = sessions.iter().map(|rows| level(&left, rows.clone())).collect();
         let zero = median_of(&mut lefts.clone());
         lefts.iter().all(|left| (left - zero).abs() < OFF_THE_LINE * 2.0 * drift.abs())
     };
@@ -134,7 +130,7 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
         return None;
     }
     // A zero that is set anew in each session may lie anywhere, also about a line; within the sessions it stands then.
-    let zeros: Vec<_> = (1..sessions.len()).map(|of| move |s: usize, _: usize| f64::from(u8::from(s == of))).collect();
+    let zeros: Vec<_> = sessions[1..].iter().map(|of| |row: usize| f64::from(u8::from(of.contains(&row)))).collect();
     let columns: Vec<Extra> = all.into_iter().chain(zeros.iter().map(|zero| zero as Extra)).collect();
     if (2..=MOST_ZEROS).contains(&sessions.len())
         && let Some(fit) = state.fit(&columns)
@@ -148,22 +144,17 @@ pub(in crate::measurement) fn slope(sessions: &[Session], gear: &Gear) -> Option
     ((drift / formal).abs() > CERTAIN).then_some(([2.0 * drift, 2.0 * formal], [begin, end]))
 }
 
-/// The error from this row on, rad: a median of a few rows.
-fn error_from(session: &Session, row: usize) -> f64 {
-    level(&session.error_rad, row..(row + LEVEL_ROWS).min(session.len()))
-}
-
 /// The largest change within [`LEAP_S`], rad, between medians of a few rows.
-fn largest_leap(sessions: &[Session]) -> f64 {
-    let mut largest = 0.0f64;
-    for session in sessions {
-        let Some(time) = &session.time_s else { continue };
-        let mut later = 0;
-        for row in (0..session.len()).step_by(LEVEL_ROWS / 2) {
-            while later + 1 < session.len() && time[later] < time[row] + LEAP_S {
+fn largest_leap(log: &Log) -> f64 {
+    let (time, mut largest) = (log.of(Quantity::Time), 0.0f64);
+    for Range { start, end } in log.sessions() {
+        let from = |row: usize| level(log.of(Quantity::Error), row..(row + LEVEL_ROWS).min(end));
+        let mut later = start;
+        for row in (start..end).step_by(LEVEL_ROWS / 2) {
+            while later + 1 < end && time[later] < time[row] + LEAP_S {
                 later += 1;
             }
-            largest = largest.max((error_from(session, later) - error_from(session, row)).abs());
+            largest = largest.max((from(later) - from(row)).abs());
         }
     }
     largest
@@ -172,6 +163,7 @@ fn largest_leap(sessions: &[Session]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
 
     /// Sessions of 15 s at 100 Hz, minutes apart, on a drive with clearance and wind-up whose zero moves; `zeros` are
     /// those of the sessions.
@@ -218,7 +210,7 @@ mod tests {
 
     fn found(mut sessions: Vec<Session>) -> Option<f64> {
         let mut findings = Findings::default();
-        check(&mut sessions, &Gear::of_ratio(100.0), &mut findings);
+        Log::on(&mut sessions, |log| check(log, &Gear::of_ratio(100.0), &mut findings));
         findings.faults.first().and_then(|fault| fault.measures.arcsec_per_hour)
     }
 

@@ -5,15 +5,21 @@
 //! steps as long as these moves the error in the very row of a step, and is left alone. An angle that is repeated is
 //! as old as the row is late: only rows with a new one show an error. One that stands because it is read in coarse
 //! counts goes on by single counts.
+//!
+//! A torque that is written in coarse steps stands likewise: laws of the load would see steps that the drive does not
+//! make. Where the column goes from one step to the next the load is halfway between them: a curve through these
+//! points, within half a step of what is written, stands in. A load that is put on in steps is left alone here, too.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
-use super::lattice::lattice;
-use super::{Findings, leave_out_rows, rhythm, runs, straight, throughout};
-use crate::measurement::Session;
+use super::resolution::lattice;
+use super::steps::largest_torque;
+use super::{Findings, marked, rhythm, straight};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
 use flexspline_base::robust::median_of;
 
 /// Runs of one value that show a rhythm, at least. *Guess*.
@@ -40,23 +46,18 @@ const SAME: f64 = 1e-13;
 
 /// Names channels that are repeated from row to row: a straight line takes the place of what is repeated of a torque,
 /// and rows that repeat an angle are left out.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     for channel in [Quantity::Torque, Quantity::Generator, Quantity::Output] {
-        let values: Vec<Vec<f64>> = sessions
-            .iter()
-            .map(|session| match channel {
-                Quantity::Torque => session.torque_n_m.clone().unwrap_or_default(),
-                Quantity::Generator => session.generator_rad.clone(),
-                _ => session.output_rad(gear.ratio),
-            })
-            .collect();
-        let of: Vec<Runs> = values.iter().map(|values| runs_of(values)).collect();
-        let Some((every, fault)) = repeats(sessions, &of) else { continue };
+        let values = if channel == Quantity::Output { log.output_rad(gear.ratio) } else { log.of(channel).to_vec() };
+        // But for round-off.
+        let same = SAME * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let runs = log.runs(&values, 1, |a, b| (a - b).abs() <= same);
+        let Some(every) = repeats(log, &runs) else { continue };
         let is_torque = channel == Quantity::Torque;
         let is_as_it_was = if is_torque {
-            every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of)
+            every >= NO_STEPS_OF_A_BENCH && !goes_on_between(log, &runs)
         } else {
-            values.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| counts(angle, runs))
+            counts(log, &values, &runs)
         };
         if is_as_it_was {
             continue;
@@ -66,48 +67,40 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         } else {
             (Treatment::Masked, " while the drive moves on: rows that repeat one are left out")
         };
-        findings.add(Some(fault), channel, treatment, |_| {
+        findings.add(log.fault(FaultName::FrozenChannel, 0..log.len()), channel, treatment, |fault| {
+            fault.rows = runs.iter().map(|run| run.len() as u64 - 1).sum();
+            fault.measures.every_rows = Some(every as u64);
             format!("the {channel} has a new value in one of {every} rows, and is repeated in the others{meanwhile}")
         });
         if is_torque {
-            for (session, runs) in sessions.iter_mut().zip(&of) {
-                let Some(torque) = &mut session.torque_n_m else { continue };
-                runs.windows(2).for_each(|pair| straight(torque, pair[0].start, pair[1].start));
-            }
+            let mut torque = values;
+            let pairs = runs.windows(2).filter(|pair| log.continues(pair[1].start));
+            pairs.for_each(|pair| straight(&mut torque, pair[0].start, pair[1].start));
+            log.put(channel, torque);
         } else {
             // Where it stands for longer, it is the drive that stands.
-            let short = |runs: &Runs| runs.clone().into_iter().filter(|run| run.len() <= 2 * every);
-            leave_out_rows(sessions, of.iter().map(|runs| short(runs).flat_map(|run| run.start + 1..run.end)));
+            let short = runs.into_iter().filter(|run| run.len() <= 2 * every);
+            log.leave_out(&marked(log.len(), short.flat_map(|run| run.start + 1..run.end)));
         }
     }
 }
 
-/// Runs of one value of a channel in a session.
-pub(super) type Runs = Vec<Range<usize>>;
-
-/// Runs of one value, but for round-off.
-fn runs_of(values: &[f64]) -> Runs {
-    let same = SAME * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    runs(values, |a, b| (a - b).abs() <= same)
-}
-
-/// Rows from one new value to the next, if most runs of one value are as long; with the fault of it, to be completed.
-fn repeats(sessions: &[Session], of: &[Runs]) -> Option<(usize, Fault)> {
+/// Rows from one new value to the next, if most runs of one value are as long.
+fn repeats(log: &Log, runs: &[Range<usize>]) -> Option<usize> {
     // The first and the last of a session are cut.
-    let inner = of.iter().flat_map(|runs| runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default());
+    let inner = runs.iter().filter(|run| log.continues(run.start) && log.continues(run.end));
     let lengths: Vec<f64> = inner.map(|run| run.len() as f64).collect();
     let enough = lengths.len() >= FEWEST_RUNS;
     let every = rhythm(lengths, REGULAR, |rows, every| rows == every || rows == 2.0 * every)?;
-    let rows = of.iter().flatten().map(|run| run.len() as u64 - 1).sum();
-    let measures = Measures { every_rows: Some(every as u64), ..Measures::default() };
-    let fault = throughout(sessions, FaultName::FrozenChannel).filter(|_| enough && every <= LONGEST)?;
-    Some((every, Fault { rows, measures, ..fault }))
+    (enough && every <= LONGEST).then_some(every)
 }
 
 /// Whether an angle stands because it is read in coarse counts.
-fn counts(angle: &[f64], runs: &[Range<usize>]) -> bool {
-    let steps = runs.windows(2).map(|pair| (angle[pair[1].start] - angle[pair[0].start]).abs());
-    lattice(angle).is_some_and(|count| {
+fn counts(log: &Log, angle: &[f64], runs: &[Range<usize>]) -> bool {
+    let session = log.sessions().max_by_key(Range::len).unwrap_or_default();
+    let pairs = runs.windows(2).filter(|pair| pair[0].start >= session.start && pair[1].end <= session.end);
+    let steps = pairs.map(|pair| (angle[pair[1].start] - angle[pair[0].start]).abs());
+    lattice(&angle[session.clone()]).is_some_and(|count| {
         let mut steps: Vec<f64> = steps.map(|step| step / count).collect();
         let mut off: Vec<f64> = steps.iter().map(|step| (step - step.round()).abs()).collect();
         median_of(&mut off) < WHOLE && median_of(&mut steps) < COUNTS
@@ -116,26 +109,177 @@ fn counts(angle: &[f64], runs: &[Range<usize>]) -> bool {
 
 /// Whether the error goes on from run to run, instead of changing with the torque within a row. Where the torque
 /// changes its sign the flank does, and those do not count.
-pub(super) fn goes_on_between(sessions: &[Session], of: &[Runs]) -> bool {
+fn goes_on_between(log: &Log, runs: &[Range<usize>]) -> bool {
+    let (torque, error) = (log.of(Quantity::Torque), log.of(Quantity::Error));
+    let level = |rows: &Range<usize>| error[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
     let (mut within, mut in_all) = (0.0, 0.0);
-    for (session, runs) in sessions.iter().zip(of) {
-        let (torque, error) = (session.torque_n_m.as_deref().unwrap_or_default(), &session.error_rad);
-        let level = |rows: &Range<usize>| error[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
-        for pair in runs.windows(2) {
-            let [low, high] = [torque[pair[0].start], torque[pair[1].start]];
-            if low * high > 0.0 {
-                // Large changes say more than small ones.
-                within += (high - low) * (error[pair[1].start] - error[pair[1].start - 1]);
-                in_all += (high - low) * (level(&pair[1]) - level(&pair[0]));
-            }
+    for pair in runs.windows(2).filter(|pair| log.continues(pair[1].start)) {
+        let [low, high] = [torque[pair[0].start], torque[pair[1].start]];
+        if low * high > 0.0 {
+            // Large changes say more than small ones.
+            within += (high - low) * (error[pair[1].start] - error[pair[1].start - 1]);
+            in_all += (high - low) * (level(&pair[1]) - level(&pair[0]));
         }
     }
     in_all > 0.0 && within < WITHIN_THE_ROW * in_all
 }
 
+/// Steps of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
+const LEAST_STEP: f64 = 0.004;
+/// Steps are those of a sensor, and not weights that somebody put on and wrote down, if there are this many of them, …
+/// *Guess*: nobody writes down as many weights.
+const MANY_STEPS: usize = 12;
+/// … and this share of the runs of one value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*:
+/// weights that are put on by hand are not torn.
+const TORN: f64 = 0.2;
+/// Rows to a step at least on either side of a change that is looked at. *Guess*: fewer give no level.
+const LEAST_ROWS: usize = 3;
+/// A change by more steps than this is by more than one. *Source*: derived, half way between one step and two.
+const MORE_THAN_ONE: f64 = 1.5;
+/// Changes to and fro between the same two steps within this many rows are one, which noise has torn. *Guess*.
+const TORN_ROWS: f64 = 12.0;
+/// A step that lasts this many times as long as most says little of the load: its rows are left out. *Guess*.
+const LONG: f64 = 8.0;
+/// Rows far from a change are left out as long as this share of the rows stays. *Guess*: fewer would leave little to
+/// diagnose.
+const STAYS: f64 = 0.5;
+
+/// Where the load is known: between two rows (in rows), and how large it is there, N·m.
+type Known = (f64, f64);
+
+/// Names a torque in coarse steps, and puts the load between them in its place.
+pub(in crate::measurement) fn check_coarse_torque(log: &mut Log, findings: &mut Findings) {
+    let torque = log.of(Quantity::Torque);
+    // A session of few loads shows a multiple of the step.
+    let Some(step) = log.pieces(torque).filter_map(lattice).min_by(f64::total_cmp) else { return };
+    if step < LEAST_STEP * largest_torque(log) {
+        return;
+    }
+    let fault = log.fault(FaultName::Quantisation, 0..log.len());
+    let levels = log.runs(torque, 1, |a, b| a == b);
+    if !goes_on_between(log, &levels) {
+        let fault = fault.filter(|_| is_of_a_sensor(torque, &levels, step));
+        findings.add(fault, Quantity::Torque, Treatment::Kept, |_| {
+            format!(
+                "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and \
+                 nothing in the rows tells it"
+            )
+        });
+        return;
+    }
+    let known = stretches(log, torque, step);
+    let pairs = known.iter().flat_map(|known| known.windows(2));
+    let mut lasting: Vec<f64> = pairs.map(|pair| pair[1].0 - pair[0].0).collect();
+    let long = LONG * median_of(&mut lasting);
+    let (mut torque, mut drop) = (torque.to_vec(), vec![true; log.len()]);
+    known.iter().for_each(|known| between(&mut torque, known, step, long, &mut drop));
+    log.put(Quantity::Torque, torque);
+    let out = drop.iter().filter(|out| **out).count();
+    let is_few = (out as f64) < (1.0 - STAYS) * log.len() as f64;
+    if is_few {
+        log.leave_out(&drop);
+    }
+    let left_out =
+        if is_few && out > 0 { format!("; {out} rows far from any such point are left out") } else { String::new() };
+    findings.add(fault, Quantity::Torque, Treatment::Repaired, |_| {
+        format!(
+            "the torque is written in steps of {step:.3} N·m, and the load goes on between them: where it goes from \
+             one to the next it is halfway, and a curve through these points stands in{left_out}"
+        )
+    });
+}
+
+/// Whether steps are those of a sensor, between which nothing shows where the load is.
+fn is_of_a_sensor(torque: &[f64], levels: &[Range<usize>], step: f64) -> bool {
+    let torn = levels.iter().filter(|rows| rows.len() < LEAST_ROWS).count();
+    let steps: HashSet<i64> = torque.iter().map(|torque| (torque / step).round() as i64).collect();
+    steps.len() >= MANY_STEPS && (torn as f64) >= TORN * levels.len() as f64
+}
+
+/// Where the load is known, in stretches of a session without a change by more than one step: there it is put on, or
+/// goes on too fast.
+fn stretches(log: &Log, torque: &[f64], step: f64) -> Vec<Vec<Known>> {
+    let mut found: Vec<Vec<Known>> = vec![Vec::new()];
+    // Rows that a change torn by noise begins and ends at, and what it is halfway between.
+    let mut torn: Option<(f64, f64, f64)> = None;
+    let whole = |(from, to, of): (f64, f64, f64)| (0.5 * (from + to), of);
+    for row in 1..torque.len() {
+        let by = (torque[row] - torque[row - 1]).abs();
+        if by == 0.0 && log.continues(row) {
+            continue;
+        }
+        let (at, middle) = (row as f64 - 0.5, 0.5 * (torque[row] + torque[row - 1]));
+        let put_on = by > MORE_THAN_ONE * step || !log.continues(row);
+        torn = match torn {
+            Some((from, to, of)) if of == middle && at - to <= TORN_ROWS && !put_on => Some((from, at, of)),
+            other => {
+                if let (Some(stretch), Some(of)) = (found.last_mut(), other) {
+                    stretch.push(whole(of));
+                }
+                (!put_on).then_some((at, at, middle))
+            }
+        };
+        if put_on {
+            found.push(Vec::new());
+        }
+    }
+    if let (Some(stretch), Some(of)) = (found.last_mut(), torn) {
+        stretch.push(whole(of));
+    }
+    found
+}
+
+/// Slopes of the natural cubic spline through what is known: of all curves the least bent one, as a load is that a
+/// machine swings. A tridiagonal system, solved by elimination (Thomas).
+fn slopes(known: &[Known]) -> Vec<f64> {
+    let length = |k: usize| known[k + 1].0 - known[k].0;
+    let chord = |k: usize| (known[k + 1].1 - known[k].1) / length(k);
+    let Some(last) = known.len().checked_sub(1).filter(|last| *last > 0) else { return vec![0.0; known.len()] };
+    // Before, on and after the diagonal, and the right side.
+    let row = |k: usize| match k {
+        0 => [0.0, 2.0, 1.0, 3.0 * chord(0)],
+        k if k == last => [1.0, 2.0, 0.0, 3.0 * chord(last - 1)],
+        k => {
+            let (h, g) = (length(k - 1), length(k));
+            [g, 2.0 * (h + g), h, 3.0 * (g * chord(k - 1) + h * chord(k))]
+        }
+    };
+    let (mut after, mut slopes) = (Vec::with_capacity(last + 1), Vec::with_capacity(last + 1));
+    for k in 0..=last {
+        let [before, on, next, right] = row(k);
+        let (above, known) = if k > 0 { (after[k - 1], slopes[k - 1]) } else { (0.0, 0.0) };
+        let pivot = on - before * above;
+        after.push(next / pivot);
+        slopes.push((right - before * known) / pivot);
+    }
+    for k in (0..last).rev() {
+        slopes[k] -= after[k] * slopes[k + 1];
+    }
+    slopes
+}
+
+/// Puts a curve through what is known in the place of the torque, within half a step of it, and says of which rows: not
+/// those of a step that lasts `long`.
+fn between(torque: &mut [f64], known: &[Known], step: f64, long: f64, drop: &mut [bool]) {
+    let slopes = slopes(known);
+    for (k, pair) in known.windows(2).enumerate() {
+        let [(from, low), (to, high)] = [pair[0], pair[1]];
+        let length = to - from;
+        for row in from.ceil() as usize..=to.floor() as usize {
+            let share = (row as f64 - from) / length;
+            let rest = 1.0 - share;
+            let curve = rest * rest * ((1.0 + 2.0 * share) * low + share * length * slopes[k])
+                + share * share * ((1.0 + 2.0 * rest) * high - rest * length * slopes[k + 1]);
+            torque[row] = curve.clamp(torque[row] - 0.5 * step, torque[row] + 0.5 * step);
+            drop[row] = length > long;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
 
     fn load(t: f64) -> f64 {
         25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos()
@@ -155,7 +299,7 @@ mod tests {
 
     fn found(sessions: &mut [Session]) -> Option<(FaultName, Option<u64>)> {
         let mut findings = Findings::default();
-        check(sessions, &Gear::of_ratio(100.0), &mut findings);
+        Log::on(sessions, |log| check(log, &Gear::of_ratio(100.0), &mut findings));
         findings.faults.pop().map(|fault| (fault.name, fault.measures.every_rows))
     }
 
@@ -204,5 +348,73 @@ mod tests {
     fn a_load_that_is_put_on_in_steps_is_one() {
         let steps = |row: usize| load(0.01 * (row / 20 * 20) as f64);
         assert_eq!(found(&mut sessions(steps, steps)), None);
+    }
+}
+
+#[cfg(test)]
+mod tests_of_a_coarse_torque {
+    use super::*;
+    use crate::measurement::Session;
+
+    /// A load that swings, the error it makes (30 µrad per N·m and some noise), and what a column in steps of `step`
+    /// says of the load.
+    fn sessions(step: f64, load: impl Fn(f64) -> f64, felt: impl Fn(f64) -> f64) -> Vec<Session> {
+        let mut random = fastrand::Rng::with_seed(6);
+        let times = || (0..6000).map(|k| 0.01 * f64::from(k));
+        let error = |t: f64, random: &mut fastrand::Rng| 3e-5 * felt(t) + 5e-6 * (random.f64() - 0.5);
+        vec![Session {
+            line: (2..6002).collect(),
+            generator_rad: times().map(|t| 4.0 * t).collect(),
+            error_rad: times().map(|t| error(t, &mut random)).collect(),
+            torque_n_m: Some(times().map(|t| (load(t) / step).round() * step).collect()),
+            ..Session::default()
+        }]
+    }
+
+    fn on(sessions: &mut [Session], findings: &mut Findings) {
+        Log::on(sessions, |log| check_coarse_torque(log, findings));
+    }
+
+    #[test]
+    fn steps_of_a_sensor_are_named_where_the_load_is_put_on_and_weights_are_not() {
+        let mut random = fastrand::Rng::with_seed(2);
+        let mut levels = Vec::new();
+        (0..60).for_each(|_| levels.push(25.0 * (2.0 * random.f64() - 1.0)));
+        // Put on within three rows.
+        let load = |t: f64| {
+            let (at, since) = ((t as usize).min(58), (t.fract() / 0.03).min(1.0));
+            levels[at] + since * (levels[at + 1] - levels[at])
+        };
+        let mut findings = Findings::default();
+        on(&mut sessions(1.0, load, load), &mut findings);
+        let fault = findings.faults.pop().expect("a fault");
+        assert_eq!((fault.name, fault.treatment), (FaultName::Quantisation, Treatment::Kept));
+        let weights = |t: f64| levels[(t as usize).min(59)].round();
+        on(&mut sessions(1.0, weights, weights), &mut findings);
+        assert!(findings.faults.is_empty());
+    }
+
+    #[test]
+    fn a_load_between_coarse_steps_is_read_off_and_one_in_steps_is_left_alone() {
+        let load = |t: f64| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
+        let mut rounded = sessions(5.0, load, load);
+        let mut findings = Findings::default();
+        on(&mut rounded, &mut findings);
+        let fault = findings.faults.pop().expect("a fault");
+        assert_eq!((fault.name, fault.channel), (FaultName::Quantisation, Some(Quantity::Torque)));
+        let of = &rounded[0];
+        let off = |k: usize| of.torque_n_m.as_ref().unwrap()[k] - load(0.01 * (of.line[k] - 2) as f64);
+        let rms = ((0..of.len()).map(|k| off(k).powi(2)).sum::<f64>() / of.len() as f64).sqrt();
+        // Rounding leaves 5/√12 = 1.44.
+        assert!(rms < 0.25 && of.len() > 4500, "{rms} in {} rows", of.len());
+        let in_steps = |t: f64| (load(t) / 5.0).round() * 5.0;
+        let mut put_on = sessions(5.0, in_steps, in_steps);
+        let before = put_on.clone();
+        on(&mut put_on, &mut findings);
+        assert!(findings.faults.is_empty() && put_on == before);
+        // Digits are no steps.
+        let mut fine = sessions(1e-3, load, load);
+        on(&mut fine, &mut findings);
+        assert!(findings.faults.is_empty());
     }
 }

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::{ARCSEC, Findings, add_steps, extent, farthest, level, whole_pitches};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
 use flexspline_base::robust::median_of;
@@ -65,7 +65,7 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         let together = (psi - delta).abs() <= TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs());
         (together && by_generator > LEAPS_MORE * by_output).then_some((row, turns))
     };
-    let leaps: Vec<Turns> = (1..log.len()).filter(|row| log.continues(*row)).filter_map(of_row).collect();
+    let leaps: Vec<Turns> = log.continued().filter_map(of_row).collect();
     let times = if leaps.len() == 1 { "once".to_owned() } else { format!("in {} rows", leaps.len()) };
     take_turns_out(log, &leaps, FaultName::PositionJump, gear, findings, |largest| {
         format!(
@@ -98,12 +98,12 @@ fn take_turns_out(
     what: impl FnOnce(f64) -> String,
 ) {
     let largest = farthest(leaps.iter().map(|(_, turns)| *turns));
-    let fault = log.fault(name, leaps.iter().map(|(row, _)| *row)).map(|fault| Fault {
-        size_arcsec: Some(-largest * TAU / gear.ratio / ARCSEC),
-        measures: Measures { turns: Some(largest as i64), ..Measures::default() },
-        ..fault
+    let fault = log.fault(name, leaps.iter().map(|(row, _)| *row));
+    findings.add(fault, Quantity::Generator, Treatment::Repaired, |fault| {
+        fault.size_arcsec = Some(-largest * TAU / gear.ratio / ARCSEC);
+        fault.measures.turns = Some(largest as i64);
+        what(largest)
     });
-    findings.add(fault, Quantity::Generator, Treatment::Repaired, |_| what(largest));
     log.get_mut(Quantity::Generator).into_iter().for_each(|generator| add_steps(generator, leaps, -TAU));
 }
 
@@ -118,27 +118,23 @@ fn between(sessions: &[Range<usize>]) -> impl Iterator<Item = (usize, impl Fn(&[
     })
 }
 
-/// Finds sessions before which the generator's counter began anew, and puts the turns back; gives those sessions whose
-/// zero is another one, by no whole turns or pitches, with what was taken off them, rad.
-pub(in crate::measurement) fn between_sessions(
-    log: &mut Log,
-    gear: &Gear,
-    findings: &mut Findings,
-) -> Vec<(usize, f64)> {
+/// Finds sessions before which the generator's counter began anew, and puts the turns back; and those whose zero is
+/// another one, by no whole turns or pitches, which is taken off.
+pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     let sessions: Vec<Range<usize>> = log.sessions().collect();
-    let Some(error) = error_of(log, gear).filter(|_| sessions.len() > 1) else { return Vec::new() };
+    let Some(error) = error_of(log, gear).filter(|_| sessions.len() > 1) else { return };
     let grows = grows(log.get(Quantity::Generator).unwrap_or_default(), &error, &sessions);
     let mut restarts: Vec<Turns> = Vec::new();
     // The rows at which sessions of another zero begin, with its change, rad.
     let mut others: Vec<(usize, f64)> = Vec::new();
-    let mut taken_off: Vec<(usize, f64)> = Vec::new();
-    for (session, (start, change)) in (1..).zip(between(&sessions)) {
+    let mut taken_off: Vec<(u32, f64)> = Vec::new();
+    for (start, change) in between(&sessions) {
         let jump = change(&error);
         if let Some(turns) = whole_turns(-jump * gear.ratio) {
             restarts.push((start, turns));
-        } else if !grows && jump.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, NEAR_PITCHES) {
+        } else if !grows && jump.abs() > OTHER_ZERO_RAD && whole_pitches(jump, gear, NEAR_PITCHES, 0.0).is_none() {
             others.push((start, jump));
-            taken_off.push((session, taken_off.last().map_or(0.0, |(_, off)| *off) + jump));
+            taken_off.push((log.number(start), taken_off.last().map_or(0.0, |(_, off)| *off) + jump));
         }
     }
     // One turn of the motor is two tooth pitches: alone it may be teeth that have skipped, and is left to the
@@ -165,8 +161,8 @@ pub(in crate::measurement) fn between_sessions(
     });
     let largest_arcsec = farthest(others.iter().map(|(_, jump)| *jump)) / ARCSEC;
     let fault = log.fault(FaultName::PositionJump, others.iter().map(|(row, _)| *row));
-    let fault = fault.map(|fault| Fault { size_arcsec: Some(largest_arcsec), ..fault });
-    findings.add(fault, None::<Quantity>, Treatment::Repaired, |_| {
+    findings.add(fault, None::<Quantity>, Treatment::Repaired, |fault| {
+        fault.size_arcsec = Some(largest_arcsec);
         let numbers: Vec<String> =
             taken_off.iter().take(LISTED).map(|(session, _)| (session + 1).to_string()).collect();
         format!(
@@ -178,7 +174,7 @@ pub(in crate::measurement) fn between_sessions(
         )
     });
     log.get_mut(Quantity::Output).into_iter().for_each(|output| add_steps(output, &others, -1.0));
-    taken_off
+    log.zeros = taken_off;
 }
 
 /// Output less generator over ratio; none where the error was recorded.
@@ -221,12 +217,12 @@ mod tests {
         log
     }
 
-    fn found(log: &mut Log) -> (Vec<Fault>, Vec<(usize, f64)>) {
+    fn found(log: &mut Log) -> (Vec<Fault>, Vec<(u32, f64)>) {
         let gear = Gear { tooth_pitch_rad: Some(TAU / 200.0), ..Gear::of_ratio(RATIO) };
         let mut findings = Findings::default();
         check(log, &gear, &mut findings);
-        let others = between_sessions(log, &gear, &mut findings);
-        (findings.faults, others)
+        between_sessions(log, &gear, &mut findings);
+        (findings.faults, log.zeros.clone())
     }
 
     fn generator_goes_on(log: &Log) -> bool {

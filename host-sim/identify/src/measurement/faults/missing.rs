@@ -2,7 +2,7 @@
 
 use super::{Findings, marked, rhythm, straight};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 
 /// Missing rows one after another that are filled by a straight line, except in the angles. *Guess*: torque and
@@ -52,8 +52,8 @@ pub(in crate::measurement) fn fill(log: &mut Log, findings: &mut Findings) {
         let Some(values) = log.get_mut(channel) else { continue };
         if 2 * holes.len() > rows {
             log.take(channel);
-            let fault = fault.map(|fault| Fault { time_s: None, until_s: None, ..fault });
             findings.add(fault, channel, Treatment::Masked, |fault| {
+                (fault.time_s, fault.until_s) = (None, None);
                 format!("{} of {rows} values of the {channel} are missing: it is not used", fault.rows)
             });
             continue;

@@ -32,11 +32,9 @@
 //! | coarse resolution of an angle or of the torque, implausible time | named |
 
 pub(super) mod clock;
-pub(super) mod coarse_torque;
 pub(super) mod drift;
 pub(super) mod frozen;
 pub(super) mod held;
-pub(super) mod lattice;
 pub(super) mod leaps;
 pub(super) mod missing;
 pub(super) mod outliers;
@@ -69,52 +67,28 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Adds a fault, if there is one: its channel, the remedy, and a sentence on both.
+    /// Adds a fault, if there is one: its channel, the remedy, and a sentence on both; `what` may say more of it.
     pub(super) fn add(
         &mut self,
         fault: Option<Fault>,
         channel: impl Into<Option<Quantity>>,
         treatment: Treatment,
-        what: impl FnOnce(&Fault) -> String,
+        what: impl FnOnce(&mut Fault) -> String,
     ) {
-        let channel = channel.into();
-        self.faults.extend(fault.map(|fault| Fault { channel, treatment, what: what(&fault), ..fault }));
+        let Some(mut fault) = fault else { return };
+        (fault.channel, fault.treatment) = (channel.into(), treatment);
+        fault.what = what(&mut fault);
+        self.faults.push(fault);
     }
-}
-
-/// A fault of some rows of sessions, each a session and a row of it, in order; none without rows.
-fn of_rows(sessions: &[Session], name: FaultName, rows: impl IntoIterator<Item = (usize, usize)>) -> Option<Fault> {
-    let at = |(session, row): (usize, usize)| {
-        let Session { line, time_s, .. } = &sessions[session];
-        (line[row], time_s.as_ref().map(|time| time[row]))
-    };
-    Fault::of_rows(name, rows.into_iter().map(at))
 }
 
 /// A fault of all rows, to be completed; nothing without rows.
 pub(crate) fn throughout(sessions: &[Session], name: FaultName) -> Option<Fault> {
-    of_rows(
-        sessions,
-        name,
-        sessions.iter().enumerate().flat_map(|(k, session)| (0..session.len()).map(move |row| (k, row))),
-    )
-}
-
-/// Rows of all sessions.
-fn rows_of(sessions: &[Session]) -> usize {
-    sessions.iter().map(Session::len).sum()
-}
-
-/// Leaves out the rows of each session for which `drop` is true.
-fn leave_out(sessions: &mut [Session], drop: &[Vec<bool>]) {
-    let some = sessions.iter_mut().zip(drop).filter(|(_, drop)| drop.contains(&true));
-    some.for_each(|(session, drop)| session.leave_out(drop));
-}
-
-/// Leaves out these rows, given session by session.
-fn leave_out_rows<I: IntoIterator<Item = usize>>(sessions: &mut [Session], rows: impl IntoIterator<Item = I>) {
-    let drop: Vec<Vec<bool>> = sessions.iter().zip(rows).map(|(session, rows)| marked(session.len(), rows)).collect();
-    leave_out(sessions, &drop);
+    let rows = sessions.iter().flat_map(|session| {
+        let time = |row: usize| session.time_s.as_ref().map(|time| time[row]);
+        session.line.iter().enumerate().map(move |(row, line)| (*line, time(row)))
+    });
+    Fault::of_rows(name, rows)
 }
 
 /// Rows of a series, as a flag for each.
@@ -122,17 +96,6 @@ fn marked(count: usize, rows: impl IntoIterator<Item = usize>) -> Vec<bool> {
     let mut marked = vec![false; count];
     rows.into_iter().for_each(|row| marked[row] = true);
     marked
-}
-
-/// Stretches of rows that are the same as the first of them.
-fn runs(values: &[f64], same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
-    let (mut found, mut from) = (Vec::new(), 0);
-    for row in 1..=values.len() {
-        if row == values.len() || !same(values[row], values[from]) {
-            found.push(std::mem::replace(&mut from, row)..row);
-        }
-    }
-    found
 }
 
 /// The usual one of distances of rows, two at least, if this share of them is `near` it.
@@ -197,10 +160,10 @@ impl LineFit {
     }
 }
 
-/// Whether an angle at the output is a whole number of tooth pitches, but for this share of a pitch.
-fn whole_pitches(angle_rad: f64, gear: &Gear, share: f64) -> bool {
-    gear.tooth_pitch_rad.is_some_and(|pitch| {
-        let pitches = (angle_rad / pitch).round();
-        pitches != 0.0 && (angle_rad - pitches * pitch).abs() < share * pitch
-    })
+/// The tooth pitches that an angle at the output is, if it is a whole number of them but for this share of a pitch, or
+/// this angle.
+fn whole_pitches(angle_rad: f64, gear: &Gear, share: f64, but_rad: f64) -> Option<f64> {
+    let pitch = gear.tooth_pitch_rad?;
+    let pitches = (angle_rad / pitch).round();
+    (pitches != 0.0 && (angle_rad - pitches * pitch).abs() < but_rad.max(share * pitch)).then_some(pitches)
 }

@@ -1,12 +1,14 @@
 //! Single rows that neither the rows before nor those after bear out.
 
+use std::ops::Range;
+
 use super::resolution::seen;
 use super::steps::{HELD, largest_torque};
-use super::{ARCSEC, Findings, farthest, leave_out_rows, level, of_rows, rows_of};
-use crate::measurement::Session;
+use super::{ARCSEC, Findings, farthest, level, marked};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled, white_noise};
 
 /// A row is out by this number of standard deviations of the white noise… *Guess*, raised from 8 for fewer false
@@ -86,11 +88,8 @@ fn strikes(torque: &[f64], row: usize, largest_n_m: f64) -> bool {
 }
 
 /// Whether the load moves the drive for a row: it lets go of a flank, or stands out itself.
-fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
-    session
-        .torque_n_m
-        .as_ref()
-        .is_some_and(|torque| strikes(torque, row, largest_n_m) || out_by(torque, row).abs() > SWINGS * largest_n_m)
+fn load_swings(torque: &[f64], row: usize, largest_n_m: f64) -> bool {
+    strikes(torque, row, largest_n_m) || out_by(torque, row).abs() > SWINGS * largest_n_m
 }
 
 /// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.
@@ -109,20 +108,18 @@ fn out_by(values: &[f64], row: usize) -> f64 {
 /// A row, and by how much it is out.
 type Out = (usize, f64);
 
-/// Rows of the error that are out by more than `least`, in all sessions; looked for again with less regard for the rows
-/// around where there are many.
-fn in_sessions(sessions: &[Session], least: f64) -> Vec<Vec<Out>> {
-    let beyond = |others: usize| -> Vec<Vec<Out>> {
-        sessions.iter().map(|session| rows_out(&session.error_rad, least, others)).collect()
+/// Rows of a channel that are out by more than `least` in their session.
+fn in_sessions(log: &Log, channel: Quantity, least: f64, others: usize) -> Vec<Out> {
+    let of = |rows: Range<usize>| {
+        let found = rows_out(log.of(channel).get(rows.clone()).unwrap_or_default(), least, others);
+        found.into_iter().map(move |(row, by)| (rows.start + row, by))
     };
-    let found = beyond(1);
-    let many = count(&found) as f64 > MANY * rows_of(sessions) as f64;
-    if many { beyond(OTHERS_OUT) } else { found }
+    log.sessions().flat_map(of).collect()
 }
 
-/// Rows of all sessions.
-fn count(found: &[Vec<Out>]) -> usize {
-    found.iter().map(Vec::len).sum()
+/// Whether more rows are out than hide others.
+fn are_many(found: &[Out], log: &Log) -> bool {
+    found.len() as f64 > MANY * log.len() as f64
 }
 
 /// Rows that are out by more than `least`, and by far more than all around them but `others` of them.
@@ -150,71 +147,65 @@ fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
 }
 
 /// Finds outliers; rows with an outlying error are left out, other channels are mended from the neighbouring rows.
-pub(in crate::measurement) fn check(
-    sessions: &mut [Session],
-    gear: &Gear,
-    error_recorded: bool,
-    findings: &mut Findings,
-) {
-    of_error(sessions, gear, error_recorded, findings);
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    of_error(log, gear, findings);
     for channel in [Quantity::Torque, Quantity::Temperature] {
-        of_load(sessions, channel, findings);
+        of_load(log, channel, findings);
     }
 }
 
 /// Outliers of the error: left out, and named where they are the data's and not the drive's.
-fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, findings: &mut Findings) {
-    let rows = rows_of(sessions) as f64;
-    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
-    let resolution = seen(sessions, gear, error_recorded).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
+fn of_error(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    let noise = white_noise(log.pieces(log.of(Quantity::Error)));
+    let resolution = seen(log, gear).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
-    let largest_n_m = largest_torque(sessions);
-    let swings = |(number, found): (usize, Vec<Out>)| -> (Vec<Out>, Vec<Out>) {
-        found.into_iter().partition(|(row, _)| load_swings(&sessions[number], *row, largest_n_m))
+    let largest_n_m = largest_torque(log);
+    let mut all = in_sessions(log, Quantity::Error, least, 1);
+    if are_many(&all, log) {
+        all = in_sessions(log, Quantity::Error, least, OTHERS_OUT);
+    }
+    let swings = |(row, _): &Out| {
+        let session = log.around(*row);
+        let torque = log.get(Quantity::Torque).map(|torque| &torque[session.clone()]);
+        torque.is_some_and(|torque| load_swings(torque, row - session.start, largest_n_m))
     };
-    let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) =
-        in_sessions(sessions, least).into_iter().enumerate().map(swings).unzip();
-    let some = |found: &[Vec<Out>]| (1.0..=SHARE * rows).contains(&(count(found) as f64));
-    let mut drop: Vec<Vec<usize>> = vec![Vec::new(); sessions.len()];
-    let mut drop_all = |found: &[Vec<Out>]| {
-        drop.iter_mut().zip(found).for_each(|(drop, found)| drop.extend(found.iter().map(|(row, _)| *row)));
-    };
+    let (moved, found): (Vec<Out>, Vec<Out>) = all.into_iter().partition(swings);
+    let some = |found: &[Out]| (1.0..=SHARE * log.len() as f64).contains(&(found.len() as f64));
+    let mut drop = vec![false; log.len()];
+    let mut drop_all = |found: &[Out]| found.iter().for_each(|(row, _)| drop[*row] = true);
     if some(&moved) {
         findings.notes.push(format!(
             "{} single rows stand out where the load swings within a row, and the drive with it; they are left out",
-            count(&moved)
+            moved.len()
         ));
         drop_all(&moved);
     }
-    let number = count(&found);
+    let number = found.len();
     let mut many = false;
     if some(&found) {
-        let is_fast = |session: &Session, row: usize| {
-            (session.generator_rad[row + 1] - session.generator_rad[row - 1]).abs() > 2.0 * TOOTH_RAD
-        };
-        let mut of_sessions = found.iter().zip(sessions.iter());
-        let fast = of_sessions.all(|(rows, session)| rows.iter().all(|(row, _)| is_fast(session, *row)));
-        let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_RAD);
+        let generator = log.of(Quantity::Generator);
+        let fast = found.iter().all(|(row, _)| (generator[row + 1] - generator[row - 1]).abs() > 2.0 * TOOTH_RAD);
+        let large = found.iter().any(|(_, by)| by.abs() > LARGE_RAD);
         if (number < FEW || fast) && !large {
             findings.notes.push(format!(
                 "{number} single rows stand out: too few, or in too fast a motion, to tell drive from data"
             ));
-        } else if repeat_with_position(sessions, &found, gear) {
+        } else if repeat_with_position(generator, &found, gear) {
             findings
                 .notes
                 .push(format!("{number} single rows stand out, always in the same position: the drive, not the data"));
         } else {
-            report(sessions, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
+            report(log, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
             drop_all(&found);
-            many = number as f64 > MANY * rows;
+            many = are_many(&found, log);
         }
     }
-    leave_out_rows(sessions, drop);
+    log.leave_out(&drop);
     if many {
         let tail = (TAIL * noise).max(STEPS * resolution);
-        let more: u64 = (0..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(sessions, tail)).sum();
+        let more: usize = (0..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(log, tail)).sum();
         if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
-            fault.rows += more;
+            fault.rows += more as u64;
         }
     }
 }
@@ -232,80 +223,63 @@ const TAIL_ROUNDS: usize = 3;
 
 /// Where many rows are out, those are as well that stand next to others, or where the drive might have moved them, at
 /// reversals and steps of the load. Gives how many are left out.
-fn leave_out_the_doubtful(sessions: &mut [Session], least: f64) -> u64 {
-    let mut more = 0;
-    for session in sessions.iter_mut().filter(|session| session.len() > 4 * AROUND_ONE) {
-        let error = &session.error_rad;
-        let drop: Vec<bool> = (0..error.len())
-            .map(|row| {
-                if row < AROUND_ONE || row + AROUND_ONE >= error.len() {
-                    return false;
-                }
-                let before = level(error, row.saturating_sub(WIDELY_AROUND)..row);
-                let after = level(error, row + 1..(row + 1 + WIDELY_AROUND).min(error.len()));
-                let (from_before, from_after) = (error[row] - before, error[row] - after);
-                let by = from_before.abs().min(from_after.abs());
-                from_before * from_after > 0.0 && by > least && (after - before).abs() < 0.5 * by
-            })
-            .collect();
-        more += drop.iter().filter(|drop| **drop).count() as u64;
-        session.leave_out(&drop);
-    }
-    more
+fn leave_out_the_doubtful(log: &mut Log, least: f64) -> usize {
+    let error = log.of(Quantity::Error);
+    let is_doubtful = |row: &usize| {
+        let Range { start, end } = log.around(*row);
+        if end - start <= 4 * AROUND_ONE || *row < start + AROUND_ONE || row + AROUND_ONE >= end {
+            return false;
+        }
+        let before = level(error, row.saturating_sub(WIDELY_AROUND).max(start)..*row);
+        let after = level(error, row + 1..(row + 1 + WIDELY_AROUND).min(end));
+        let (from_before, from_after) = (error[*row] - before, error[*row] - after);
+        let by = from_before.abs().min(from_after.abs());
+        from_before * from_after > 0.0 && by > least && (after - before).abs() < 0.5 * by
+    };
+    let rows = log.len();
+    let doubtful = (0..rows).filter(is_doubtful).collect::<Vec<usize>>();
+    log.leave_out(&marked(rows, doubtful));
+    rows - log.len()
 }
 
 /// Outliers of torque or temperature: mended from the neighbouring rows.
-fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings) {
-    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.column(channel)).collect();
-    let mut some: Vec<f64> = series.iter().flat_map(|values| sampled(values)).collect();
+fn of_load(log: &mut Log, channel: Quantity, findings: &mut Findings) {
+    let mut some: Vec<f64> = log.pieces(log.of(channel)).flat_map(sampled).collect();
     let range = quantile_of(&mut some, 0.99) - quantile_of(&mut some, 0.01);
-    let least = (OUT * white_noise(series)).max(LEAST_OF_RANGE * range);
+    let least = (OUT * white_noise(log.pieces(log.of(channel)))).max(LEAST_OF_RANGE * range);
     if least == 0.0 {
         return;
     }
-    let of = |session: &Session| rows_out(session.column(channel).unwrap_or_default(), least, 1);
-    let found: Vec<Vec<Out>> = sessions.iter().map(of).collect();
-    let number = count(&found);
-    let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_OF_RANGE * range);
-    let too_many = number as f64 > SHARE * rows_of(sessions) as f64;
-    if number == 0 || too_many || (number < FEW && !large) {
+    let found = in_sessions(log, channel, least, 1);
+    let large = found.iter().any(|(_, by)| by.abs() > LARGE_OF_RANGE * range);
+    let too_many = found.len() as f64 > SHARE * log.len() as f64;
+    if found.is_empty() || too_many || (found.len() < FEW && !large) {
         return;
     }
-    report(sessions, &found, channel, Treatment::Repaired, "the rows beside stand in", findings);
-    for (session, found) in sessions.iter_mut().zip(&found) {
-        if let Some(values) = session.column_mut(channel) {
-            found.iter().for_each(|(row, _)| values[*row] = 0.5 * (values[row - 1] + values[row + 1]));
-        }
+    report(log, &found, channel, Treatment::Repaired, "the rows beside stand in", findings);
+    if let Some(values) = log.get_mut(channel) {
+        found.iter().for_each(|(row, _)| values[*row] = 0.5 * (values[row - 1] + values[row + 1]));
     }
 }
 
 /// Reports rows of a channel that are out, and what was done with them.
-fn report(
-    sessions: &[Session],
-    found: &[Vec<Out>],
-    channel: Quantity,
-    treatment: Treatment,
-    done: &str,
-    findings: &mut Findings,
-) {
-    let rows = found.iter().enumerate().flat_map(|(k, rows)| rows.iter().map(move |(row, _)| (k, *row)));
-    let largest = farthest(found.iter().flatten().map(|(_, by)| *by));
+fn report(log: &Log, found: &[Out], channel: Quantity, treatment: Treatment, done: &str, findings: &mut Findings) {
+    let largest = farthest(found.iter().map(|(_, by)| *by));
     let largest_arcsec = Some(largest / ARCSEC).filter(|_| channel == Quantity::Error);
     let size = largest_arcsec.map_or(format!("{largest:.3}"), |arcsec| format!("{arcsec:.1} arcsec"));
-    let advice = match channel {
-        Quantity::Error => FaultName::Outliers.advice(),
-        _ => "check the cable and the amplifier of this sensor; log its raw values",
-    };
-    let fault = of_rows(sessions, FaultName::Outliers, rows);
-    let fault = fault.map(|fault| Fault { size_arcsec: largest_arcsec, advice, ..fault });
+    let fault = log.fault(FaultName::Outliers, found.iter().map(|(row, _)| *row));
     findings.add(fault, channel, treatment, |fault| {
+        fault.size_arcsec = largest_arcsec;
+        if channel != Quantity::Error {
+            fault.advice = "check the cable and the amplifier of this sensor; log its raw values";
+        }
         format!("{} single rows of the {channel} are out, the farthest by {size}: {done}", fault.rows)
     });
 }
 
 /// Whether rows gather at the same angle of a wheel, more than all rows do.
-pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gear: &Gear) -> bool {
-    let n = count(found) as f64;
+pub(super) fn repeat_with_position(generator: &[f64], found: &[Out], gear: &Gear) -> bool {
+    let n = found.len() as f64;
     if n < FEW as f64 {
         return false;
     }
@@ -320,11 +294,8 @@ pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gea
             }
             f64::hypot(c, s) / f64::max(n, 1.0)
         };
-        let of = |(session, rows): (&Session, &Vec<Out>)| -> Vec<f64> {
-            rows.iter().map(|(row, _)| session.generator_rad[*row]).collect()
-        };
-        let of_found = resultant(&mut sessions.iter().zip(found).flat_map(of));
-        let of_all = resultant(&mut sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
+        let of_found = resultant(&mut found.iter().map(|(row, _)| generator[*row]));
+        let of_all = resultant(&mut generator.iter().copied());
         of_found > of_all + 0.3 && (of_found > REPEATS || n * of_found.powi(2) > REPEATS_MANY)
     })
 }
@@ -332,6 +303,7 @@ pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gea
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
 
     /// An error that swings slowly with 2 arcsec of noise, and rows off by 60 to 600 arcsec.
     fn with_rows_out(share: f64) -> (Vec<Session>, Vec<usize>) {
@@ -357,7 +329,7 @@ mod tests {
         for share in [0.01, 0.05] {
             let (mut sessions, out) = with_rows_out(share);
             let mut findings = Findings::default();
-            check(&mut sessions, &Gear::of_ratio(95.0), false, &mut findings);
+            Log::on(&mut sessions, |log| check(log, &Gear::of_ratio(95.0), &mut findings));
             let stay = sessions[0].line.iter().filter(|line| out.contains(&(**line as usize))).count();
             let left_out = 6000 - sessions[0].len();
             assert!(stay * 100 <= out.len(), "{stay} of {} stay", out.len());
@@ -381,12 +353,7 @@ mod tests {
 
     #[test]
     fn a_row_in_which_the_load_swings_is_the_drives() {
-        let session = |torque: [f64; 7]| Session {
-            generator_rad: (0..7).map(|k| 0.05 * f64::from(k)).collect(),
-            torque_n_m: Some(torque.to_vec()),
-            ..Session::default()
-        };
-        let swings = |torque| load_swings(&session(torque), 3, 40.0);
+        let swings = |torque: [f64; 7]| load_swings(&torque, 3, 40.0);
         assert!(swings([-6.6, -5.1, -3.8, -0.4, -2.9, -4.1, -4.2]), "a flank is let go");
         assert!(!swings([0.4; 7]), "a load that does not change leaves the play where it is");
         assert!(swings([-24.6, -22.7, -20.3, -16.9, -20.7, -19.2, -21.7]), "wind-up follows a tip");

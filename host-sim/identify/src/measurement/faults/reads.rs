@@ -12,16 +12,17 @@
 //! really moves so has no such error.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use super::outliers::repeat_with_position;
 use super::resolution::seen;
 use super::state::StateModel;
-use super::{ARCSEC, Findings, farthest, leave_out_rows, rows_of, throughout};
+use super::{ARCSEC, Findings, farthest, marked};
 use crate::least_squares::Normal;
-use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
 use flexspline_base::robust::{MAD_TO_STD, median_of, quantile_of};
 
 /// Classes of speed, of equally many rows. *Guess*: enough for a line over the square of the speed.
@@ -81,8 +82,9 @@ struct Class {
 /// A row that was read late, and how far it is off, rad.
 type Late = (usize, f64);
 
-/// A session as it was read.
+/// Rows as they were read.
 struct Reads<'a> {
+    log: &'a Log,
     error: Cow<'a, [f64]>,
     /// The generator's angle over the ratio, rad.
     turned: Vec<f64>,
@@ -93,14 +95,14 @@ struct Reads<'a> {
 }
 
 impl<'a> Reads<'a> {
-    fn new(session: &'a Session, gear: &Gear) -> Self {
-        let turned: Vec<f64> = session.generator_rad.iter().map(|psi| psi / gear.ratio).collect();
-        let rows = 0..turned.len();
-        let speed = rows.clone().map(|k| {
-            let (a, b) = (k.saturating_sub(2), (k + 2).min(rows.end - 1));
-            (turned[b] - turned[a]) / (b - a).max(1) as f64
-        });
-        Reads { error: Cow::Borrowed(&session.error_rad), speed: speed.collect(), good: rows.collect(), turned }
+    fn new(log: &'a Log, gear: &Gear) -> Self {
+        let turned: Vec<f64> = log.of(Quantity::Generator).iter().map(|psi| psi / gear.ratio).collect();
+        let of_session = |rows: Range<usize>| {
+            rows.clone().map(move |k| (k.saturating_sub(2).max(rows.start), (k + 2).min(rows.end - 1)))
+        };
+        let speed = |(a, b): (usize, usize)| (turned[b] - turned[a]) / (b - a).max(1) as f64;
+        let speed = log.sessions().flat_map(of_session).map(speed).collect();
+        Reads { log, error: Cow::Borrowed(log.of(Quantity::Error)), speed, good: (0..log.len()).collect(), turned }
     }
 
     /// By how far a good row is off the cubic through the two good rows before and after it, rad; 0 near the ends.
@@ -109,7 +111,7 @@ impl<'a> Reads<'a> {
             return 0.0;
         };
         // Neighbours in time, not across what was left out.
-        if d - a > 2 * 5 {
+        if d - a > 2 * 5 || self.log.number(*a) != self.log.number(*d) {
             return 0.0;
         }
         let around = [a, b, c, d].map(|at| (*at as f64 - *row as f64, self.error[*at]));
@@ -139,7 +141,8 @@ impl<'a> Reads<'a> {
     /// another: how far the middle one is off the cubic through the others, (-1, 4, -6, 4, -1) / 6 of the values.
     fn scatter(&self) -> impl Iterator<Item = (f64, f64, usize)> + '_ {
         let off = |e: &[f64]| (6.0 * e[2] - 4.0 * (e[1] + e[3]) + e[0] + e[4]) / 6.0;
-        let fives = self.good.windows(5).filter(|rows| rows[4] - rows[0] == 4).map(|rows| rows[0]..rows[4] + 1);
+        let is_one = |rows: &&[usize]| rows[4] - rows[0] == 4 && self.log.number(rows[0]) == self.log.number(rows[4]);
+        let fives = self.good.windows(5).filter(is_one).map(|rows| rows[0]..rows[4] + 1);
         fives.map(move |rows| (off(&self.error[rows.clone()]), off(&self.turned[rows.clone()]), rows.start + 2))
     }
 }
@@ -160,10 +163,9 @@ impl Jitter {
 
     /// Of a generator whose angle is misread, by the scatter of both angles, and by how much it is off, rad at the
     /// output. Few rows that are far off decide nothing.
-    fn of_generator(reads: &[Reads<'_>], fast: f64) -> Option<(Jitter, f64)> {
-        let rows: Vec<(f64, f64, f64)> = (reads.iter())
-            .flat_map(|of| of.scatter().map(|(error, turned, row)| (error, turned, of.speed[row])))
-            .collect();
+    fn of_generator(reads: &Reads<'_>, fast: f64) -> Option<(Jitter, f64)> {
+        let of_row = |(error, turned, row): (f64, f64, usize)| (error, turned, reads.speed[row]);
+        let rows: Vec<(f64, f64, f64)> = reads.scatter().map(of_row).collect();
         let most = |of: fn(&(f64, f64, f64)) -> f64| quantile_of(&mut rows.iter().map(of).collect::<Vec<f64>>(), NEAR);
         let (of_error, of_turned) = (most(|row| row.0.abs()), most(|row| row.1.abs()));
         let [mut xx, mut xy, mut yy, mut vv, mut count] = [0.0; 5];
@@ -188,7 +190,7 @@ impl Jitter {
     }
 
     /// By scatter that grows with the speed.
-    fn by_speed(reads: &[Reads<'_>], fast: f64) -> Option<Jitter> {
+    fn by_speed(reads: &Reads<'_>, fast: f64) -> Option<Jitter> {
         let classes = classes(reads, |off| MAD_TO_STD * median_of(off));
         let floor = classes.iter().map(|class| class.variance).fold(f64::INFINITY, f64::min).max(1e-30);
         // Neighbouring scatters share rows: a class is worth about a third of its rows. A median deviation is known to
@@ -214,9 +216,8 @@ impl Jitter {
 
 /// Scatter by speed, of classes with equally many rows. `spread` makes a standard deviation of absolute values, which
 /// it may overwrite.
-fn classes(reads: &[Reads<'_>], spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class> {
-    let mut rows: Vec<(f64, f64)> =
-        (reads.iter()).flat_map(|of| of.scatter().map(|(off, _, row)| (of.speed[row].abs(), off.abs()))).collect();
+fn classes(reads: &Reads<'_>, spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class> {
+    let mut rows: Vec<(f64, f64)> = reads.scatter().map(|(off, _, row)| (reads.speed[row].abs(), off.abs())).collect();
     rows.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let of = |class: &[(f64, f64)]| {
         let (mut off, rows): (Vec<f64>, f64) = (class.iter().map(|(_, off)| *off).collect(), class.len() as f64);
@@ -231,22 +232,20 @@ fn classes(reads: &[Reads<'_>], spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class
 
 /// Finds angles that are not read at one instant: rows weigh what their speed leaves of them, and rows that were read
 /// late are left out.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    let rows = rows_of(sessions);
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    let rows = log.len();
     if rows < CLASSES * CLASS_ROWS {
         return;
     }
-    let mut reads: Vec<Reads<'_>> = sessions.iter().map(|session| Reads::new(session, gear)).collect();
-    let mut speeds: Vec<f64> = reads.iter().flat_map(|of| of.speed.iter().map(|speed| speed.abs())).collect();
-    let fast = quantile_of(&mut speeds, 0.95);
+    let mut reads = Reads::new(log, gear);
+    let fast = quantile_of(&mut reads.speed.iter().map(|speed| speed.abs()).collect::<Vec<f64>>(), 0.95);
     if fast == 0.0 {
         return;
     }
     // By what was measured alone: waves of a fast drive, once they are fitted, follow what its angle is misread by.
     let misread = Jitter::of_generator(&reads, fast);
-    if misread.as_ref().is_some_and(|(_, off)| is_of_counts(sessions, gear, Quantity::Generator, *off)) {
-        drop(reads);
-        sessions.iter_mut().for_each(|session| session.loudness = Some(vec![1.0; session.len()]));
+    if misread.as_ref().is_some_and(|(_, off)| is_of_counts(log, gear, Quantity::Generator, *off)) {
+        log.loudness = Some(vec![1.0; rows]);
         return;
     }
     let (mut late, mut by_speed) = (Vec::new(), None);
@@ -254,31 +253,28 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         // Waves of the drive that fast rows are too far apart to follow scatter as well: what shows has to show without
         // what its state explains, too.
         if without_state {
-            let state = StateModel::new(sessions, gear);
+            let state = StateModel::new(log, gear);
             let Some(fit) = state.fit(&[]) else { break };
-            for (session, of) in reads.iter_mut().enumerate() {
-                of.error = Cow::Owned(state.left(&fit, session, &[]));
-            }
+            reads.error = Cow::Owned(state.left(&fit, &[]));
         }
-        late = late_rows(&mut reads, fast, sessions, gear);
+        late = late_rows(&mut reads, fast, gear);
         by_speed = Jitter::by_speed(&reads, fast)
-            .filter(|jitter| misread.is_none() && !is_of_counts(sessions, gear, Quantity::Output, jitter.rows * fast));
+            .filter(|jitter| misread.is_none() && !is_of_counts(log, gear, Quantity::Output, jitter.rows * fast));
         if late.is_empty() && misread.is_none() && by_speed.is_none() {
             return;
         }
     }
     let jitter = misread.map(|(jitter, _)| jitter).or(by_speed);
     // Rows that are late by less than can be detected stay: as many again, and as late, on the mean.
-    let by_rows = |of: &Reads<'_>, (row, off): &Late| (off / of.speed[*row].abs().max(IN_MOTION * fast)).abs();
-    let late_by = reads.iter().zip(&late).flat_map(|(of, late)| late.iter().map(|late| by_rows(of, late)));
-    let late_rows_each = median_of(&mut late_by.collect::<Vec<f64>>());
-    let speed: Vec<Vec<f64>> = reads.into_iter().map(|of| of.speed).collect();
-    let late_rows: usize = late.iter().map(Vec::len).sum();
+    let speed = reads.speed;
+    let by_rows = |(row, off): &Late| (off / speed[*row].abs().max(IN_MOTION * fast)).abs();
+    let late_rows_each = median_of(&mut late.iter().map(by_rows).collect::<Vec<f64>>());
+    let late_rows = late.len();
     let late_share = late_rows as f64 / rows as f64;
-    let period_s = period_s(sessions);
+    let period_s = period_s(log);
     let jitter_ms = jitter.as_ref().and_then(|jitter| Some(1e3 * period_s? * jitter.rows));
     let mut said = Vec::new();
-    let mut size_rad = farthest(late.iter().flatten().map(|(_, off)| *off)).abs();
+    let mut size_rad = farthest(late.iter().map(|(_, off)| *off)).abs();
     let late_said = (late_rows > 0).then(|| {
         format!(
             "{late_rows} rows ({:.1} %) are read late, by up to {:.0} arcsec: they are left out",
@@ -298,37 +294,37 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         ));
     }
     said.extend(late_said);
-    let measures =
-        Measures { jitter_ms, late_rows: Some(late_rows as u64).filter(|rows| *rows > 0), ..Measures::default() };
-    let fault = throughout(sessions, FaultName::ReadJitter);
-    let fault = fault.map(|fault| Fault { measures, size_arcsec: Some(size_rad / ARCSEC), ..fault });
-    findings.add(fault, None::<Quantity>, Treatment::Masked, |_| {
+    findings.add(log.fault(FaultName::ReadJitter, 0..rows), None::<Quantity>, Treatment::Masked, |fault| {
+        fault.size_arcsec = Some(size_rad / ARCSEC);
+        fault.measures.jitter_ms = jitter_ms;
+        fault.measures.late_rows = Some(late_rows as u64).filter(|rows| *rows > 0);
         format!("the two angles are not read at one instant: {}", said.join("; "))
     });
-    let Jitter { noise, rows } = jitter.unwrap_or(Jitter { noise: 1.0, rows: 0.0 });
-    let unsure_s = (rows + UNSEEN * late_share * late_rows_each) * period_s.unwrap_or(1.0);
-    sessions.iter_mut().for_each(|session| session.unsure_s = unsure_s);
-    weigh(sessions, &speed, noise.max(1e-3 * rows * fast), rows);
-    if late_rows > 0 {
-        leave_out_rows(sessions, late.iter().map(|late| late.iter().map(|late| late.0)));
-    }
+    let Jitter { noise, rows: jitter_rows } = jitter.unwrap_or(Jitter { noise: 1.0, rows: 0.0 });
+    log.unsure_s = (jitter_rows + UNSEEN * late_share * late_rows_each) * period_s.unwrap_or(1.0);
+    // Each row has its noise against that of a row of mean worth.
+    let noise = noise.max(1e-3 * jitter_rows * fast);
+    let loud: Vec<f64> = speed.iter().map(|speed| noise.hypot(jitter_rows * speed)).collect();
+    let worth = loud.iter().map(|loud| loud.powi(-2)).sum::<f64>() / rows as f64;
+    log.loudness = Some(loud.iter().map(|loud| loud * worth.sqrt()).collect());
+    log.leave_out(&marked(rows, late.into_iter().map(|(row, _)| row)));
 }
 
 /// Whether what an angle is off by, rad at the output, is that it is read in counts, within half of one: that is its
 /// resolution, and known as such.
-fn is_of_counts(sessions: &[Session], gear: &Gear, channel: Quantity, off: f64) -> bool {
-    seen(sessions, gear, false).into_iter().any(|(of, step)| of == channel && off < 0.5 * step)
+fn is_of_counts(log: &Log, gear: &Gear, channel: Quantity, off: f64) -> bool {
+    let is_it = |of: Quantity| (of == Quantity::Generator) == (channel == Quantity::Generator);
+    seen(log, gear).into_iter().any(|(of, step)| is_it(of) && off < 0.5 * step)
 }
 
 /// Whether the scatter of rows in motion is that of readings which know nothing of each other.
-fn is_white(reads: &[Reads<'_>], fast: f64) -> bool {
-    let pairs = || {
-        reads.iter().flat_map(|of| {
-            let off: Vec<(f64, f64, usize)> = of.scatter().filter(|row| of.speed[row.2].abs() > 0.5 * fast).collect();
-            let next = |pair: &[(f64, f64, usize)]| (pair[1].2 == pair[0].2 + 1).then(|| [pair[0].0, pair[1].0]);
-            off.windows(2).filter_map(next).collect::<Vec<[f64; 2]>>()
-        })
+fn is_white(reads: &Reads<'_>, fast: f64) -> bool {
+    let off: Vec<(f64, f64, usize)> = reads.scatter().filter(|row| reads.speed[row.2].abs() > 0.5 * fast).collect();
+    let next = |pair: &[(f64, f64, usize)]| {
+        let follows = pair[1].2 == pair[0].2 + 1 && reads.log.continues(pair[1].2);
+        follows.then(|| [pair[0].0, pair[1].0])
     };
+    let pairs = || off.windows(2).filter_map(next);
     let spread = MAD_TO_STD * median_of(&mut pairs().map(|[off, _]| off.abs()).collect::<Vec<f64>>());
     let cut = |off: f64| off.clamp(-4.0 * spread, 4.0 * spread);
     let (own, common) = pairs()
@@ -343,64 +339,52 @@ fn expected(known: &[Class], speed: f64) -> f64 {
     class.map_or(f64::INFINITY, |class| (class.variance * SCATTER_GAIN).sqrt())
 }
 
-/// Rows that were read late, session by session, which are no good ones then: off by far, enough of them in motion, to
-/// one side of it, at no one place of the drive. Else none, and all rows are good.
-fn late_rows(reads: &mut [Reads<'_>], fast: f64, sessions: &[Session], gear: &Gear) -> Vec<Vec<Late>> {
-    reads.iter_mut().for_each(|of| of.good = (0..of.speed.len()).collect());
-    let mut late: Vec<Vec<Late>> = vec![Vec::new(); reads.len()];
+/// Rows that were read late, which are no good ones then: off by far, enough of them in motion, to one side of it, at
+/// no one place of the drive. Else none, and all rows are good.
+fn late_rows(reads: &mut Reads<'_>, fast: f64, gear: &Gear) -> Vec<Late> {
+    reads.good = (0..reads.speed.len()).collect();
+    let mut late: Vec<Late> = Vec::new();
     for _ in 0..LATE_PASSES {
         let known = classes(reads, |off| quantile_of(off, LOW.0) / LOW.1);
-        let more: Vec<Vec<Late>> = reads.iter_mut().map(|of| of.take_late(&known)).collect();
+        let more = reads.take_late(&known);
         // Most logs end here.
-        let found: usize = more.iter().map(Vec::len).sum();
-        late.iter_mut().zip(more).for_each(|(late, more)| late.extend(more));
-        if found < LATE_ROWS {
+        let few = more.len() < LATE_ROWS;
+        late.extend(more);
+        if few {
             break;
         }
     }
-    late.iter_mut().for_each(|late| late.sort_unstable_by_key(|(row, _)| *row));
+    late.sort_unstable_by_key(|(row, _)| *row);
     let moves = |speed: &f64| speed.abs() > IN_MOTION * fast;
-    let moving = reads.iter().flat_map(|of| &of.speed).filter(|speed| moves(speed)).count() as f64;
+    let moving = reads.speed.iter().filter(|speed| moves(speed)).count() as f64;
     // Whether each that moves is ahead.
-    let ahead: Vec<bool> = (reads.iter().zip(&late))
-        .flat_map(|(of, late)| late.iter().map(|(row, off)| (of.speed[*row], *off)))
-        .filter(|(speed, _)| moves(speed))
-        .map(|(speed, off)| off * speed > 0.0)
-        .collect();
+    let moving_late = late.iter().map(|(row, off)| (reads.speed[*row], off)).filter(|(speed, _)| moves(speed));
+    let ahead: Vec<bool> = moving_late.map(|(speed, off)| off * speed > 0.0).collect();
     let count = ahead.len() as f64;
     let forward = ahead.iter().filter(|ahead| **ahead).count() as f64;
     let are_late = ahead.len() >= LATE_ROWS
         && (LATE_SHARE[0]..=LATE_SHARE[1]).contains(&(count / moving))
         && forward.max(count - forward) >= ONE_SIDED * count
-        && !repeat_with_position(sessions, &late, gear);
+        && !repeat_with_position(reads.log.of(Quantity::Generator), &late, gear);
     if !are_late {
-        reads.iter_mut().for_each(|of| of.good = (0..of.speed.len()).collect());
+        reads.good = (0..reads.speed.len()).collect();
         late.clear();
     }
     late
 }
 
 /// Median period of the rows, s.
-fn period_s(sessions: &[Session]) -> Option<f64> {
-    let times = sessions.iter().filter_map(|session| session.time_s.as_ref());
-    let mut steps: Vec<f64> = times.flat_map(|time| time.windows(2).map(|t| t[1] - t[0])).collect();
+fn period_s(log: &Log) -> Option<f64> {
+    let time = log.get(Quantity::Time)?;
+    let mut steps: Vec<f64> = log.continued().map(|row| time[row] - time[row - 1]).collect();
     (!steps.is_empty()).then(|| median_of(&mut steps))
-}
-
-/// Gives each row its noise against that of a row of mean worth.
-fn weigh(sessions: &mut [Session], speed: &[Vec<f64>], noise: f64, jitter_rows: f64) {
-    let loud = |speed: &Vec<f64>| speed.iter().map(|speed| noise.hypot(jitter_rows * speed)).collect();
-    let all: Vec<Vec<f64>> = speed.iter().map(loud).collect();
-    let worth = all.iter().flatten().map(|loud| loud.powi(-2)).sum::<f64>() / rows_of(sessions) as f64;
-    for (session, mut loud) in sessions.iter_mut().zip(all) {
-        loud.iter_mut().for_each(|loud| *loud *= worth.sqrt());
-        session.loudness = Some(loud);
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
+    use crate::measurement::fault::Measures;
 
     /// Ratio of the made-up drive. *Guess*: a round one; any would do.
     const RATIO: f64 = 100.0;
@@ -430,11 +414,8 @@ mod tests {
     fn checked(jitter_s: f64, late: f64) -> (Session, Option<Measures>) {
         let mut sessions = vec![session(jitter_s, late)];
         let mut findings = Findings::default();
-        check(
-            &mut sessions,
-            &Gear { tooth_pitch_rad: Some(std::f64::consts::TAU / 200.0), ..Gear::of_ratio(RATIO) },
-            &mut findings,
-        );
+        let gear = Gear { tooth_pitch_rad: Some(std::f64::consts::TAU / 200.0), ..Gear::of_ratio(RATIO) };
+        Log::on(&mut sessions, |log| check(log, &gear, &mut findings));
         let measures = findings.faults.first().map(|fault| fault.measures);
         (sessions.remove(0), measures)
     }
@@ -472,7 +453,7 @@ mod tests {
                 ]);
             }
             let mut findings = Findings::default();
-            check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);
+            Log::on(std::slice::from_mut(&mut session), |log| check(log, &Gear::of_ratio(RATIO), &mut findings));
             let found = findings.faults.first().and_then(|fault| fault.measures.jitter_ms);
             assert_eq!(found.is_some(), misread > 0.0, "{step_rad} {misread} {real}: {found:?}");
             if let Some(jitter_ms) = found {
@@ -506,7 +487,7 @@ mod tests {
             session.push([1.625 * stop + 0.125 * read, psi, error * ARCSEC, f64::NAN]);
         }
         let mut findings = Findings::default();
-        check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);
+        Log::on(std::slice::from_mut(&mut session), |log| check(log, &Gear::of_ratio(RATIO), &mut findings));
         assert!(findings.faults.is_empty() && session.loudness.is_none(), "{:?}", findings.faults);
     }
 }

@@ -1,11 +1,12 @@
-//! A resolution so coarse that no noise blurs it.
+//! The lattice on which the values of a channel lie, and a resolution so coarse that no noise blurs it.
 
-use super::lattice::lattice;
-use super::{ARCSEC, Findings, throughout};
-use crate::measurement::Session;
+use std::ops::Range;
+
+use super::{ARCSEC, Findings};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
 use flexspline_base::robust::{median_of, white_noise};
 
 /// Steps at the output below this are those of good encoders, and below what a drive repeats. *Source*: derived, 19
@@ -29,17 +30,66 @@ const ROUNDED: f64 = 0.1;
 /// by just about as much, and a later one is not. *Guess*: octaves, of which one is not near a whole number.
 const APART: [usize; 4] = [1, 2, 4, 8];
 
+/// Rows looked at, in each of a few places. *Guess*: it bounds the time; steps show in far fewer.
+const ROWS: usize = 4096;
+/// A multiple of the step beyond which a gap between neighbouring values says nothing. *Guess*: at 50 steps an error of
+/// the step of a per cent is half a step.
+const FARTHEST: f64 = 50.0;
+/// Mean distance of the gaps from whole multiples, in steps, that a lattice stays below; 0.25 is chance. *Guess*: a
+/// third of that.
+const WHOLE: f64 = 0.08;
+
+/// The step of the lattice on which `values` lie, or `None` if they lie on none.
+pub(super) fn lattice(values: &[f64]) -> Option<f64> {
+    let places = (values.len() / ROWS).clamp(1, 5);
+    let mut found: Vec<f64> = (0..places)
+        .filter_map(|k| {
+            let from = (values.len() - ROWS.min(values.len())) * k / places.max(2).saturating_sub(1).max(1);
+            of_piece(&values[from.min(values.len())..(from + ROWS).min(values.len())])
+        })
+        .collect();
+    // A piece in which few steps occur shows a multiple of the lattice; most pieces have to show one.
+    (2 * found.len() > places).then(|| median_of(&mut found))
+}
+
+fn of_piece(values: &[f64]) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let range = sorted.last()? - sorted.first()?;
+    let size = sorted.last()?.abs().max(sorted.first()?.abs());
+    let least = (1e-9 * range).max(1e-13 * size);
+    let mut gaps: Vec<f64> = sorted.windows(2).map(|v| v[1] - v[0]).filter(|gap| *gap > least).collect();
+    gaps.sort_unstable_by(f64::total_cmp);
+    let mut step = *gaps.first()?;
+    let (mut kk, mut kg, mut off, mut count) = (0.0, 0.0, 0.0, 0);
+    for gap in &gaps {
+        let k = (gap / step).round();
+        if k > FARTHEST {
+            break;
+        }
+        off += (gap / step - k).abs();
+        kk += k * k;
+        kg += k * gap;
+        count += 1;
+        step = kg / kk;
+    }
+    // Few gaps do if each value occurs many times.
+    let enough = count >= 8 || (count >= 2 && 20 * (gaps.len() + 1) <= values.len());
+    (enough && off < WHOLE * f64::from(count)).then_some(step)
+}
+
 /// Resolutions that show in the data, in rad at the output.
-pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
-    let Some((session, noise)) = longest(sessions) else { return Vec::new() };
-    let (generator, output) = (&session.generator_rad, session.output_rad(gear.ratio));
+pub(super) fn seen(log: &Log, gear: &Gear) -> Vec<(Quantity, f64)> {
+    let Some(rows) = longest(log) else { return Vec::new() };
+    let (generator, error) = (&log.of(Quantity::Generator)[rows.clone()], &log.of(Quantity::Error)[rows.clone()]);
+    let output = &log.output_rad(gear.ratio)[rows];
+    let noise = white_noise(log.pieces(log.of(Quantity::Error)));
     let uneven = |values: &[f64], step: f64| {
         let bends = values.windows(3).filter(|v| (v[2] - 2.0 * v[1] + v[0]).abs() > 0.5 * step).count();
         bends as f64 >= UNEVEN * values.len() as f64
     };
     let mut found = Vec::new();
-    let (channel, measured) =
-        if error_recorded { (Quantity::Error, &session.error_rad) } else { (Quantity::Output, &output) };
+    let (channel, measured) = if log.error_recorded { (Quantity::Error, error) } else { (Quantity::Output, output) };
     if let Some(step) = lattice(measured)
         && (noise >= SEEN * step || uneven(measured, step))
     {
@@ -47,17 +97,16 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     }
     if let Some(step) = lattice(generator)
         && uneven(generator, step)
-        && differs(generator, &session.error_rad, step) >= ROUNDED * step / gear.ratio.abs()
+        && differs(generator, error, step) >= ROUNDED * step / gear.ratio.abs()
     {
         found.push((Quantity::Generator, step / gear.ratio.abs()));
     }
     found
 }
 
-/// The longest session, and the white noise of the error of all, rad.
-fn longest(sessions: &[Session]) -> Option<(&Session, f64)> {
-    let session = sessions.iter().max_by_key(|session| session.len())?;
-    Some((session, white_noise(sessions.iter().map(|session| session.error_rad.as_slice()))))
+/// The longest session.
+fn longest(log: &Log) -> Option<Range<usize>> {
+    log.sessions().max_by_key(Range::len)
 }
 
 /// By how much the error differs, at the median, from one row to another where a channel has moved by a step or more,
@@ -72,22 +121,16 @@ fn differs(channel: &[f64], error: &[f64], step: f64) -> f64 {
 
 /// Names a resolution of output or generator that is coarse at the output; nothing can be done about it but to know
 /// that rounding is a noise.
-pub(in crate::measurement) fn check(
-    sessions: &mut [Session],
-    gear: &Gear,
-    error_recorded: bool,
-    findings: &mut Findings,
-) {
-    let mut coarsest = 0.0f64;
-    let Some((session, noise)) = longest(sessions) else { return };
-    for (channel, step) in seen(sessions, gear, error_recorded) {
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    let noise = white_noise(log.pieces(log.of(Quantity::Error)));
+    for (channel, step) in seen(log, gear) {
         if step < COARSE_RAD || noise > BLURRED * step {
             continue;
         }
-        coarsest = coarsest.max(step);
-        let fault = throughout(std::slice::from_ref(session), FaultName::Quantisation);
-        let fault = fault.map(|fault| Fault { size_arcsec: Some(step / ARCSEC), ..fault });
-        findings.add(fault, channel, Treatment::Kept, |_| {
+        log.coarse_rad = log.coarse_rad.max(step);
+        let fault = log.fault(FaultName::Quantisation, longest(log).unwrap_or_default());
+        findings.add(fault, channel, Treatment::Kept, |fault| {
+            fault.size_arcsec = Some(step / ARCSEC);
             format!(
                 "the {channel} has a resolution of {:.2} arcsec at the output, and too little noise to blur it ({:.2} \
                  arcsec)",
@@ -96,12 +139,12 @@ pub(in crate::measurement) fn check(
             )
         });
     }
-    sessions.iter_mut().for_each(|session| session.coarse_rad = coarsest);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
 
     /// Ratio of the made-up drive. *Guess*: a round one; any would do.
     const RATIO: f64 = 100.0;
@@ -119,7 +162,7 @@ mod tests {
     }
 
     fn of_generator(session: Session) -> Option<f64> {
-        let found = seen(&[session], &Gear::of_ratio(RATIO), false);
+        let found = Log::on(&mut [session], |log| seen(log, &Gear::of_ratio(RATIO)));
         found.into_iter().find(|(channel, _)| *channel == Quantity::Generator).map(|(_, step)| step)
     }
 
@@ -148,5 +191,34 @@ mod tests {
         // Steps of 0.1 rad of the generator are 206 arcsec at the output.
         let found = of_generator(session(6000, |k| 0.037 * k, |psi| 0.1 * (psi / 0.1).floor()));
         assert!((found.expect("coarse") * RATIO - 0.1).abs() < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn the_step_of_a_lattice_is_found() {
+        let mut random = fastrand::Rng::with_seed(2);
+        for step in [4.8e-6, 1e-4, 0.7] {
+            for moves in [0.3, 3.0] {
+                let values: Vec<f64> = (0..30_000)
+                    .map(|k| ((f64::from(k) * 0.1 * moves + 2.0 * random.f64()).round() * step * 1e8).round() / 1e8)
+                    .collect();
+                let found = lattice(&values).expect("a lattice");
+                assert!((found / step - 1.0).abs() < 0.02, "{step} {moves}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn continuous_values_lie_on_none() {
+        for seed in 0..200 {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let values: Vec<f64> = (0..5_000).map(|k| f64::from(k) * 1e-4 + random.f64()).collect();
+            assert_eq!(lattice(&values), None, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn nothing_and_a_constant_lie_on_none() {
+        assert_eq!(lattice(&[]), None);
+        assert_eq!(lattice(&[2.0; 500]), None);
     }
 }

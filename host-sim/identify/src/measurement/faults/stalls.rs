@@ -3,7 +3,7 @@
 
 use super::{Findings, add_steps, clock, rhythm};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_of, sampled};
@@ -49,10 +49,10 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         None => leaps,
     };
     let lost_s: f64 = all.iter().map(|(_, extra_s)| extra_s).sum();
-    let (every_rows, size_ms) = (every.map(|every| every as u64), Some(1e3 * size_s));
-    let measures = Measures { every_rows, size_ms, ..Measures::default() };
-    let fault = fault.map(|fault| Fault { rows: all.len() as u64, measures, ..fault });
-    findings.add(fault, Quantity::Time, Treatment::Repaired, |_| {
+    findings.add(fault, Quantity::Time, Treatment::Repaired, |fault| {
+        fault.rows = all.len() as u64;
+        fault.measures.every_rows = every.map(|every| every as u64);
+        fault.measures.size_ms = Some(1e3 * size_s);
         format!(
             "the logger stands still for {:.0} ms {}, {} times, while its time counts {:.2} ms from row to row: both \
              angles leap there; time is made anew from the motion ({lost_s:.1} s more)",

@@ -10,8 +10,10 @@ use super::WIDEST_CLEARANCE_RAD;
 use super::steps::largest_torque;
 use crate::least_squares::add_scaled;
 use crate::linear::{Gram, Prior, solve};
+use crate::measurement::columns::Quantity;
 use crate::measurement::gear::Gear;
-use crate::measurement::{Session, TURNED_BACK_RAD, directions, turns};
+use crate::measurement::log::Log;
+use crate::measurement::{TURNED_BACK_RAD, directions, turns};
 use flexspline_base::robust::{median_and_std, rms};
 
 /// Rows that a fit uses at most, spread evenly. *Guess*: it bounds the time.
@@ -29,10 +31,10 @@ const LEAST_SIZE: f64 = 1e-12;
 
 /// Columns that depend on the state.
 pub(super) struct StateModel<'a> {
-    sessions: &'a [Session],
+    log: &'a Log,
     ratio: f64,
-    /// +1 after forward motion, -1 after backward.
-    flank: Vec<Vec<f64>>,
+    /// +1 after forward motion, -1 after backward, row by row.
+    pub(super) flank: Vec<f64>,
     torque_scale: f64,
     motion_scale: f64,
     temperature: (f64, f64),
@@ -43,8 +45,7 @@ pub(super) struct StateModel<'a> {
 /// Rows that a fit uses.
 #[derive(Default)]
 struct SampledRows {
-    /// Session and row.
-    places: Vec<(usize, usize)>,
+    places: Vec<usize>,
     error: Vec<f64>,
     /// Columns of the state.
     columns: Vec<Vec<f64>>,
@@ -63,49 +64,42 @@ pub(super) struct StateFit {
 }
 
 /// A column in addition to those of the state.
-pub(super) type Extra<'a> = &'a dyn Fn(usize, usize) -> f64;
+pub(super) type Extra<'a> = &'a dyn Fn(usize) -> f64;
 
 impl<'a> StateModel<'a> {
-    pub fn new(sessions: &'a [Session], gear: &Gear) -> Self {
-        let flank = sessions.iter().map(|session| directions(&session.generator_rad)).collect();
-        let temperatures = || sessions.iter().filter_map(|session| session.temperature_c.as_ref()).flatten();
-        let mean = temperatures().sum::<f64>() / temperatures().count().max(1) as f64;
-        let warmest = temperatures().fold(1.0, |most: f64, value| most.max(value.abs()));
-        let turned = sessions.iter().flat_map(|session| &session.generator_rad);
+    pub fn new(log: &'a Log, gear: &Gear) -> Self {
+        let generator = log.of(Quantity::Generator);
+        let temperatures = log.of(Quantity::Temperature);
+        let mean = temperatures.iter().sum::<f64>() / temperatures.len().max(1) as f64;
+        let warmest = temperatures.iter().fold(1.0, |most: f64, value| most.max(value.abs()));
         StateModel {
-            sessions,
+            log,
             ratio: gear.ratio,
-            flank,
-            torque_scale: largest_torque(sessions),
-            motion_scale: turned.fold(1e-12, |most: f64, psi| most.max(psi.abs())),
+            flank: log.pieces(generator).flat_map(directions).collect(),
+            torque_scale: largest_torque(log),
+            motion_scale: generator.iter().fold(1e-12, |most: f64, psi| most.max(psi.abs())),
             temperature: (mean, warmest),
             sampled: OnceLock::new(),
         }
     }
 
-    /// Whether the generator last moved forward (+1) or backward (-1).
-    pub(crate) fn flank(&self, session: usize, row: usize) -> f64 {
-        self.flank[session][row]
-    }
-
-    /// Rows, by session, at which the generator has gone on so far since it turned back that clearance is taken up, and
-    /// does not turn back within a few rows.
-    pub fn settled(&self) -> Vec<Vec<bool>> {
-        let of = |session: &Session| -> Vec<bool> {
-            let psi = &session.generator_rad;
+    /// Rows at which the generator has gone on so far since it turned back that clearance is taken up, and does not
+    /// turn back within a few rows.
+    pub fn settled(&self) -> Vec<bool> {
+        let of = |psi: &[f64]| -> Vec<bool> {
             let far = |((_, turned_at), psi): (&(f64, f64), &f64)| {
                 (psi - turned_at).abs() > WIDEST_CLEARANCE_RAD * self.ratio.abs()
             };
             let far: Vec<bool> = turns(psi, TURNED_BACK_RAD).iter().zip(psi).map(far).collect();
             (0..far.len()).map(|row| far[row] && far[(row + BEFORE).min(far.len() - 1)]).collect()
         };
-        self.sessions.iter().map(of).collect()
+        self.log.pieces(self.log.of(Quantity::Generator)).flat_map(of).collect()
     }
 
     /// The columns at a row.
-    fn fill(&self, session: usize, row: usize, to: &mut Vec<f64>) {
-        let s = &self.sessions[session];
-        let (psi, flank) = (s.generator_rad[row], self.flank[session][row]);
+    fn fill(&self, row: usize, to: &mut Vec<f64>) {
+        let generator = self.log.of(Quantity::Generator);
+        let (psi, flank) = (generator[row], self.flank[row]);
         let delta = psi / self.ratio;
         to.extend([1.0, flank, psi / self.motion_scale]);
         for (angle, orders) in [(psi, &[1.0, 2.0, 4.0][..]), (psi - delta, &[1.0, 2.0, 4.0]), (delta, &[1.0, 2.0])] {
@@ -113,50 +107,48 @@ impl<'a> StateModel<'a> {
         }
         let (sin, cos) = (2.0 * psi).sin_cos();
         to.extend([flank * sin, flank * cos]);
-        let previous = if row == 0 { (row + 1).min(s.len() - 1) } else { row - 1 };
-        let moved = (s.generator_rad[row] - s.generator_rad[previous]) * if row == 0 { -1.0 } else { 1.0 };
-        let speed = match &s.time_s {
+        let continues = |row: usize| self.log.continues(row);
+        let begins = !continues(row);
+        let previous = if begins { row + usize::from(continues(row + 1)) } else { row - 1 };
+        let moved = (generator[row] - generator[previous]) * if begins { -1.0 } else { 1.0 };
+        let speed = match self.log.get(Quantity::Time) {
             Some(time) if time[row] != time[previous] => moved / (time[row] - time[previous]).abs(),
             _ => moved,
         };
         to.push(speed);
-        let torque = s.torque_n_m.as_ref().filter(|_| self.torque_scale > 0.0);
+        let torque = self.log.get(Quantity::Torque).filter(|_| self.torque_scale > 0.0);
         let t = torque.map_or(0.0, |torque| torque[row] / self.torque_scale);
         to.extend([t, t * t.abs(), (t / 0.05).tanh(), flank * t.abs()]);
         let (mean, warmest) = self.temperature;
-        let t = s.temperature_c.as_ref().map_or(0.0, |temperature| (temperature[row] - mean) / warmest);
+        let temperature = self.log.get(Quantity::Temperature);
+        let t = temperature.map_or(0.0, |temperature| (temperature[row] - mean) / warmest);
         to.extend([t, flank * t]);
     }
 
-    /// The error freed of what a fit without its last `extras` columns says, of all rows of a session.
-    pub fn left(&self, fit: &StateFit, session: usize, extras: &[Extra]) -> Vec<f64> {
+    /// The error freed of what a fit of the state and `extras` says.
+    pub fn left(&self, fit: &StateFit, extras: &[Extra]) -> Vec<f64> {
         let mut columns = Vec::new();
-        (0..self.sessions[session].len())
-            .map(|row| {
-                columns.clear();
-                self.fill(session, row, &mut columns);
-                columns.extend(extras.iter().map(|extra| extra(session, row)));
-                let said: f64 = columns.iter().zip(&fit.value).map(|(column, value)| column * value).sum();
-                self.sessions[session].error_rad[row] - said
-            })
-            .collect()
+        let left = |(row, error): (usize, &f64)| {
+            columns.clear();
+            self.fill(row, &mut columns);
+            columns.extend(extras.iter().map(|extra| extra(row)));
+            error - columns.iter().zip(&fit.value).map(|(column, value)| column * value).sum::<f64>()
+        };
+        self.log.of(Quantity::Error).iter().enumerate().map(left).collect()
     }
 
     /// Rows spread evenly, with the columns of the state.
     fn sample(&self) -> SampledRows {
-        let rows: usize = self.sessions.iter().map(Session::len).sum();
-        let step = rows.div_ceil(FIT_ROWS).max(1);
+        let step = self.log.len().div_ceil(FIT_ROWS).max(1);
         let mut sampled = SampledRows::default();
         let mut at_row = Vec::new();
-        for (number, session) in self.sessions.iter().enumerate() {
-            for row in (0..session.len()).step_by(step) {
-                at_row.clear();
-                self.fill(number, row, &mut at_row);
-                sampled.columns.resize_with(at_row.len(), Vec::new);
-                sampled.columns.iter_mut().zip(&at_row).for_each(|(column, value)| column.push(*value));
-                sampled.places.push((number, row));
-                sampled.error.push(session.error_rad[row]);
-            }
+        for row in self.log.sessions().flat_map(|rows| rows.step_by(step)) {
+            at_row.clear();
+            self.fill(row, &mut at_row);
+            sampled.columns.resize_with(at_row.len(), Vec::new);
+            sampled.columns.iter_mut().zip(&at_row).for_each(|(column, value)| column.push(*value));
+            sampled.places.push(row);
+            sampled.error.push(self.log.of(Quantity::Error)[row]);
         }
         sampled
     }
@@ -165,7 +157,7 @@ impl<'a> StateModel<'a> {
     pub fn fit(&self, extras: &[Extra]) -> Option<StateFit> {
         let SampledRows { places, error, columns } = self.sampled.get_or_init(|| self.sample());
         let n = error.len();
-        let extra_column = |extra: &Extra| places.iter().map(|(session, row)| extra(*session, *row)).collect();
+        let extra_column = |extra: &Extra| places.iter().map(|row| extra(*row)).collect();
         let extra_columns: Vec<Vec<f64>> = extras.iter().map(extra_column).collect();
         let all: Vec<&[f64]> = columns.iter().chain(&extra_columns).map(Vec::as_slice).collect();
         if n < 2 * all.len() {
@@ -197,7 +189,7 @@ impl<'a> StateModel<'a> {
         let cut = |x: f64| x.clamp(-3.0 * sigma, 3.0 * sigma);
         let (mut own, mut next) = (0.0, 0.0);
         for k in 1..n {
-            if places[k].1 != 0 {
+            if self.log.continues(places[k]) {
                 own += cut(left[k]).powi(2);
                 next += cut(left[k]) * cut(left[k - 1]);
             }

@@ -5,11 +5,11 @@
 //! crossed, wind-up and damaged teeth do not: they come back with the state of the drive.
 
 use super::state::{Extra, StateFit, StateModel};
-use super::{ARCSEC, Findings, level, of_rows, whole_pitches};
-use crate::measurement::Session;
+use super::{ARCSEC, Findings, add_steps, level, whole_pitches};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, ToothStep, Treatment};
+use crate::measurement::fault::{FaultName, ToothStep, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
 use flexspline_base::robust::{median_and_std, median_of, sampled, white_noise};
 
 /// A change in one row that is suspected exceeds the motion of the generator, over the ratio, by this factor… *Guess*:
@@ -68,109 +68,87 @@ const LOCAL_NOISE: f64 = 2.2;
 /// than a traverse of the clearance.
 const APART: usize = 12;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct StepPlace {
-    session: usize,
-    row: usize,
-}
-
-impl StepPlace {
-    fn reached(self, session: usize, row: usize) -> f64 {
-        f64::from(u8::from((session, row) >= (self.session, self.row)))
-    }
-}
-
-/// A column that steps from 0 to 1.
-fn column(place: StepPlace) -> impl Fn(usize, usize) -> f64 {
-    move |session, row| place.reached(session, row)
+/// A column that steps from 0 to 1 at a row.
+fn column(at: usize) -> impl Fn(usize) -> f64 {
+    move |row| f64::from(u8::from(row >= at))
 }
 
 /// Does something with the columns of steps, and `more` behind them.
-fn with_columns<T>(steps: impl IntoIterator<Item = StepPlace>, more: &[Extra], then: impl FnOnce(&[Extra]) -> T) -> T {
+fn with_columns<T>(steps: impl IntoIterator<Item = usize>, more: &[Extra], then: impl FnOnce(&[Extra]) -> T) -> T {
     let steps: Vec<_> = steps.into_iter().map(column).collect();
     let all: Vec<Extra> = steps.iter().map(|step| step as Extra).chain(more.iter().copied()).collect();
     then(&all)
 }
 
 /// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    let Some([sure, doubtful]) = Seen::of(sessions, gear).find() else { return };
-    for (place, size, _) in &doubtful {
-        let line = sessions[place.session].line[place.row];
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    let Some([sure, doubtful]) = Seen::of(log, gear).find() else { return };
+    for (row, size, _) in &doubtful {
         findings.notes.push(format!(
-            "line {line}: the error steps by {:.1} arcsec; a jump of an encoder or a change of flank, which these \
-             data do not tell",
+            "line {}: the error steps by {:.1} arcsec; a jump of an encoder or a change of flank, which these data do \
+             not tell",
+            log.line[*row],
             size / ARCSEC
         ));
     }
-    for (place, size, std) in sure {
-        let (session, size_arcsec) = (&sessions[place.session], size / ARCSEC);
-        let (line, time_s) = (session.line[place.row], session.time_s.as_ref().map(|time| time[place.row]));
-        if let Some(pitch) = gear.tooth_pitch_rad {
-            let pitches = (size / pitch).round();
-            if pitches != 0.0 && (size - pitches * pitch).abs() < (5.0 * std).max(WHOLE_PITCH * pitch) {
-                let StepPlace { session, row, .. } = place;
-                let pitches = pitches as i32;
-                findings.tooth_steps.push(ToothStep { session, row, line, time_s, size_arcsec, pitches });
-                continue;
-            }
+    for (row, size, std) in sure {
+        let size_arcsec = size / ARCSEC;
+        if let Some(pitches) = whole_pitches(size, gear, WHOLE_PITCH, 5.0 * std) {
+            let session = log.sessions().take_while(|rows| rows.end <= row).count();
+            let (line, time_s) = (log.line[row], log.get(Quantity::Time).map(|time| time[row]));
+            let (pitches, row) = (pitches as i32, row - log.around(row).start);
+            findings.tooth_steps.push(ToothStep { session, row, line, time_s, size_arcsec, pitches });
+            continue;
         }
-        let fault = of_rows(sessions, FaultName::EncoderIndexJump, [(place.session, place.row)]);
-        let fault = fault.map(|fault| Fault { size_arcsec: Some(size_arcsec), until_s: None, ..fault });
-        findings.add(fault, Quantity::Error, Treatment::Repaired, |_| {
+        let fault = log.fault(FaultName::EncoderIndexJump, [row]);
+        findings.add(fault, Quantity::Error, Treatment::Repaired, |fault| {
+            (fault.size_arcsec, fault.until_s) = (Some(size_arcsec), None);
             format!(
                 "the error steps by {size_arcsec:.1} arcsec (standard deviation {:.1}) within one row and stays \
                  there: an encoder has lost its index; the step is taken out",
                 std / ARCSEC
             )
         });
-        for (number, session) in sessions.iter_mut().enumerate() {
-            let rows = session.error_rad.iter_mut().enumerate();
-            rows.for_each(|(row, error)| *error -= size * place.reached(number, row));
-        }
+        log.get_mut(Quantity::Error).into_iter().for_each(|error| add_steps(error, &[(row, size)], -1.0));
     }
 }
 
-/// A step with its size and standard deviation.
-type Step = (StepPlace, f64, f64);
+/// A row into which the error steps, with the size and its standard deviation.
+type Step = (usize, f64, f64);
 
 /// A recording with what is known of it.
 struct Seen<'a> {
-    sessions: &'a [Session],
+    log: &'a Log,
+    error: &'a [f64],
+    generator: &'a [f64],
     gear: &'a Gear,
     /// White noise of the error, rad.
     noise: f64,
     state: StateModel<'a>,
-    /// Rows at which clearance is taken up, by session.
-    settled: Vec<Vec<bool>>,
+    /// Rows at which clearance is taken up.
+    settled: Vec<bool>,
     /// Largest torque, N·m.
     largest: f64,
 }
 
 impl<'a> Seen<'a> {
-    fn of(sessions: &'a [Session], gear: &'a Gear) -> Seen<'a> {
-        let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
-        let state = StateModel::new(sessions, gear);
-        Seen { sessions, gear, noise, settled: state.settled(), state, largest: largest_torque(sessions) }
-    }
-
-    /// All rows but the first of each session.
-    fn rows(&self) -> impl Iterator<Item = StepPlace> + '_ {
-        let of = |(session, of): (usize, &Session)| (1..of.len()).map(move |row| StepPlace { session, row });
-        self.sessions.iter().enumerate().flat_map(of)
+    fn of(log: &'a Log, gear: &'a Gear) -> Seen<'a> {
+        let (error, generator) = (log.of(Quantity::Error), log.of(Quantity::Generator));
+        let (noise, state) = (white_noise(log.pieces(error)), StateModel::new(log, gear));
+        Seen { log, error, generator, gear, noise, settled: state.settled(), state, largest: largest_torque(log) }
     }
 
     /// Lasting steps, and those that may be a change of flank.
     fn find(&self) -> Option<[Vec<Step>; 2]> {
         let mut places = self.sudden();
-        let mut rejected: Vec<StepPlace> = Vec::new();
+        let mut rejected: Vec<usize> = Vec::new();
         let mut steps: Vec<Step> = Vec::new();
         for round in 0..ROUNDS {
             // Drop one by one what does not last, the weakest first.
             let fit = loop {
                 let fit = with_columns(places.iter().copied(), &[], |columns| self.state.fit(columns))?;
                 let first = fit.value.len() - places.len();
-                let of_place = |(k, place): (usize, &StepPlace)| (*place, fit.value[first + k], fit.std[first + k]);
+                let of_place = |(k, row): (usize, &usize)| (*row, fit.value[first + k], fit.std[first + k]);
                 steps = places.iter().enumerate().map(of_place).collect();
                 let strengths = steps.iter().map(|step| self.strength(*step)).enumerate();
                 match strengths.min_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -181,54 +159,52 @@ impl<'a> Seen<'a> {
             if round + 1 == ROUNDS {
                 break;
             }
-            let known: Vec<StepPlace> = places.iter().chain(&rejected).copied().collect();
+            let known: Vec<usize> = places.iter().chain(&rejected).copied().collect();
             let more = self.standing_out(&fit, &places, &known);
             if more.is_empty() {
                 break;
             }
             places.extend(more);
-            places.sort_by_key(|place| (place.session, place.row));
+            places.sort_unstable();
         }
-        let steps = lasting(steps);
+        let steps = lasting(self.log, steps);
         let (sure, doubtful) = steps.iter().copied().partition(|step| self.no_flank_was_changed(&steps, *step));
         Some([sure, doubtful])
     }
 
     /// The change of the error into a row.
-    fn change(&self, StepPlace { session, row, .. }: StepPlace) -> f64 {
-        let error = &self.sessions[session].error_rad;
-        error[row] - error[row - 1]
+    fn change(&self, row: usize) -> f64 {
+        self.error[row] - self.error[row - 1]
     }
 
     /// The motion of the generator into a row, over the ratio.
-    fn motion(&self, StepPlace { session, row, .. }: StepPlace) -> f64 {
-        let generator = &self.sessions[session].generator_rad;
-        ((generator[row] - generator[row - 1]) / self.gear.ratio).abs()
+    fn motion(&self, row: usize) -> f64 {
+        ((self.generator[row] - self.generator[row - 1]) / self.gear.ratio).abs()
     }
 
     /// The change of the error into a row beyond that of a dwell, 0 if less. An output dwells after the generator
     /// turned back.
-    fn beyond_dwell(&self, place: StepPlace) -> f64 {
-        let change = self.change(place);
-        if self.settled[place.session][place.row] {
+    fn beyond_dwell(&self, row: usize) -> f64 {
+        let change = self.change(row);
+        if self.settled[row] {
             return change;
         }
-        change.signum() * (change.abs() - FASTER_THAN_DWELL * self.motion(place)).max(0.0)
+        change.signum() * (change.abs() - FASTER_THAN_DWELL * self.motion(row)).max(0.0)
     }
 
     /// Rows into which the error changes more than anything smooth explains, the largest changes first.
-    fn sudden(&self) -> Vec<StepPlace> {
-        let changes: Vec<f64> = self.rows().map(|place| self.change(place)).collect();
+    fn sudden(&self) -> Vec<usize> {
+        let changes: Vec<f64> = self.log.continued().map(|row| self.change(row)).collect();
         let usual = median_and_std(&mut sampled(&changes)).1;
         let least = (SUDDEN * usual.max(self.noise)).max(LEAST_RAD);
-        let by = self.rows().map(|place| (place, self.beyond_dwell(place).abs()));
+        let by = self.log.continued().map(|row| (row, self.beyond_dwell(row).abs()));
         largest(by.filter(|(_, by)| *by > least).collect(), &[])
     }
 
     /// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
-    fn standing_out(&self, fit: &StateFit, places: &[StepPlace], known: &[StepPlace]) -> Vec<StepPlace> {
-        let differences = |number: usize| -> Vec<f64> {
-            let left = with_columns(places.iter().copied(), &[], |columns| self.state.left(fit, number, columns));
+    fn standing_out(&self, fit: &StateFit, places: &[usize], known: &[usize]) -> Vec<usize> {
+        let left = with_columns(places.iter().copied(), &[], |columns| self.state.left(fit, columns));
+        let of_session = |left: &[f64]| -> Vec<f64> {
             let mut sums = vec![0.0; left.len() + 1];
             for row in 0..left.len() {
                 sums[row + 1] = sums[row] + left[row];
@@ -238,31 +214,31 @@ impl<'a> Seen<'a> {
             let difference = |row: usize| mean(row, row + WINDOW) - mean(row - WINDOW, row);
             (0..left.len()).map(|row| Some(row).filter(inside).map_or(0.0, difference)).collect()
         };
-        let differences: Vec<Vec<f64>> = (0..self.sessions.len()).map(differences).collect();
-        let usual = median_and_std(&mut differences.iter().flat_map(|d| sampled(d)).collect::<Vec<_>>()).1;
+        let differences: Vec<f64> = self.log.pieces(&left).flat_map(of_session).collect();
+        let usual = median_and_std(&mut self.log.pieces(&differences).flat_map(sampled).collect::<Vec<_>>()).1;
         let least = (STANDS_OUT * usual).max(LEAST_RAD);
-        let stands_out = |place: StepPlace| {
-            let size = differences[place.session][place.row];
+        let stands_out = |row: usize| {
+            let size = differences[row];
             // Of the rows around, the one where it happens.
-            let sharp = || self.beyond_dwell(place) * size.signum() > (1.0 - AGREES) * size.abs() - 4.0 * self.noise;
-            (size.abs() > least && sharp()).then_some((place, size.abs()))
+            let sharp = || self.beyond_dwell(row) * size.signum() > (1.0 - AGREES) * size.abs() - 4.0 * self.noise;
+            (size.abs() > least && sharp()).then_some((row, size.abs()))
         };
-        largest(self.rows().filter_map(stands_out).collect(), known)
+        largest(self.log.continued().filter_map(stands_out).collect(), known)
     }
 
     /// At least 1 for a step that lasts, is sudden, and is the same in both views.
-    fn strength(&self, (place, size, std): Step) -> f64 {
-        let agrees = AGREES * size.abs() + 6.0 * self.noise + 0.5 * self.motion(place);
+    fn strength(&self, (row, size, std): Step) -> f64 {
+        let agrees = AGREES * size.abs() + 6.0 * self.noise + 0.5 * self.motion(row);
         let is_seen = size.abs() >= LEAST_RAD.max(SEEN * self.noise);
-        let is_sudden = is_seen && (self.change(place) - size).abs() < agrees;
-        let session = &self.sessions[place.session];
-        let loaded = || load_changes(session, place.row, self.largest) && !whole_pitches(size, self.gear, WHOLE_PITCH);
-        if !is_sudden || loaded() || others_change_as_much(session, place.row, size) {
+        let is_sudden = is_seen && (self.change(row) - size).abs() < agrees;
+        let loaded = || self.load_changes(row) && whole_pitches(size, self.gear, WHOLE_PITCH, 0.0).is_none();
+        if !is_sudden || loaded() || self.others_change_as_much(row, size) {
             return 0.0;
         }
         // Seen close by, so that a slow change is no step: medians of a few rows.
-        let few = 6.min(place.row).min(session.len() - place.row);
-        let near = &session.error_rad[place.row - few..place.row + few];
+        let session = self.log.around(row);
+        let few = 6.min(row - session.start).min(session.end - row);
+        let near = &self.error[row - few..row + few];
         let local = level(near, few..2 * few) - level(near, 0..few);
         let mut paces: Vec<f64> = near.windows(2).map(|error| (error[1] - error[0]).abs()).collect();
         let moves = few as f64 * median_of(&mut paces);
@@ -276,27 +252,25 @@ impl<'a> Seen<'a> {
     /// step leaves clearly less than what may come in its place, together with the other steps: a step at the same
     /// angle, which goes back where the generator does, and the flank that the load last held.
     fn no_flank_was_changed(&self, steps: &[Step], (place, size, _): Step) -> bool {
-        let held = |session: &Session, row: usize| {
-            let torque = session.torque_n_m.as_ref().filter(|_| self.largest > 0.0)?;
-            Some(if torque[row].abs() >= HELD * self.largest { torque[row].signum() } else { 0.0 })
+        let torque = self.log.get(Quantity::Torque).filter(|_| self.largest > 0.0);
+        let held = |row: usize| {
+            let torque = torque?[row];
+            Some(if torque.abs() >= HELD * self.largest { torque.signum() } else { 0.0 })
         };
         if size.abs() > WIDER_THAN_CLEARANCE_RAD {
             return true;
         }
-        if held(&self.sessions[place.session], place.row) == Some(0.0) {
+        if held(place) == Some(0.0) {
             return false;
         }
-        let flanks = |session: &Session| -> Vec<f64> {
-            let last = |last: &mut f64, row: usize| {
-                *last = held(session, row).filter(|held| *held != 0.0).unwrap_or(*last);
-                Some(*last)
-            };
-            (0..session.len()).scan(0.0, last).collect()
+        let last = |last: &mut f64, row: usize| {
+            let before = if self.log.continues(row) { *last } else { 0.0 };
+            *last = held(row).filter(|held| *held != 0.0).unwrap_or(before);
+            Some(*last)
         };
-        let flanks: Vec<Vec<f64>> = self.sessions.iter().map(flanks).collect();
-        let here = self.sessions[place.session].generator_rad[place.row];
-        let at_angle = |s: usize, r: usize| f64::from(u8::from(self.sessions[s].generator_rad[r] >= here));
-        let of_load = |s: usize, r: usize| flanks[s][r];
+        let flanks: Vec<f64> = (0..self.log.len()).scan(0.0, last).collect();
+        let at_angle = |row: usize| f64::from(u8::from(self.generator[row] >= self.generator[place]));
+        let of_load = |row: usize| flanks[row];
         let misfit = |this: Extra| {
             let others = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place);
             with_columns(others, &[this], |columns| self.state.fit(columns)).map(|fit| fit.misfit)
@@ -304,12 +278,33 @@ impl<'a> Seen<'a> {
         let less = |other: Extra| misfit(&column(place)) < misfit(other).map(|other| CLEARLY_LESS * other);
         less(&at_angle) && less(&of_load)
     }
+
+    /// Whether load changes at once, by more than its noise and its usual pace, near a row.
+    fn load_changes(&self, row: usize) -> bool {
+        self.log.get(Quantity::Torque).is_some_and(|torque| {
+            let session = self.log.around(row);
+            let near = |rows| &torque[row.saturating_sub(rows).max(session.start)..(row + rows).min(session.end)];
+            let mut paces: Vec<f64> = near(50).windows(2).map(|t| (t[1] - t[0]).abs()).collect();
+            let usual = (LOAD_STEP * self.largest)
+                .max(LOAD_NOISE * white_noise([near(50)]))
+                .max(LOAD_PACE * median_of(&mut paces));
+            self.largest > 0.0 && near(4).windows(2).any(|t| (t[1] - t[0]).abs() > usual)
+        })
+    }
+
+    /// Whether the error changes about as much in other rows near by: ringing, a change of speed, a traverse of the
+    /// clearance.
+    fn others_change_as_much(&self, row: usize, size: f64) -> bool {
+        let session = self.log.around(row);
+        let near = row.saturating_sub(APART).max(session.start + 1)..(row + APART + 1).min(session.end);
+        near.filter(|k| *k != row).any(|k| self.change(k).abs() > 0.5 * size.abs())
+    }
 }
 
 /// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion
 /// samples once, a flank that drag turns over until the drive slows down. Each is taken back once, by its nearest
 /// neighbours first.
-fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
+fn lasting(log: &Log, mut steps: Vec<Step>) -> Vec<Step> {
     for long in 2..=steps.len() {
         let share = if long == 2 { TAKEN_BACK } else { TAKEN_BACK_TOGETHER };
         let cancel = |run: &[Step]| {
@@ -318,7 +313,7 @@ fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
         };
         let apart = |run: &[Step]| {
             let (first, last) = (run[0].0, run[long - 1].0);
-            (last.session - first.session, last.row.abs_diff(first.row))
+            (log.number(last) - log.number(first), last - first)
         };
         loop {
             let runs = steps.windows(long).enumerate().filter(|(_, run)| cancel(run));
@@ -329,53 +324,34 @@ fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
     steps
 }
 
-/// The places of the largest values, apart from each other and from those known.
-fn largest(mut found: Vec<(StepPlace, f64)>, known: &[StepPlace]) -> Vec<StepPlace> {
+/// The rows of the largest values, apart from each other and from those known.
+fn largest(mut found: Vec<(usize, f64)>, known: &[usize]) -> Vec<usize> {
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut places: Vec<StepPlace> = Vec::new();
+    let mut places: Vec<usize> = Vec::new();
     for (place, _) in found {
-        let near = |other: &StepPlace| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
+        let near = |other: &usize| other.abs_diff(place) < WINDOW / 2;
         if places.len() < AT_ONCE && !places.iter().chain(known).any(near) {
             places.push(place);
         }
     }
-    places.sort_by_key(|place| (place.session, place.row));
+    places.sort_unstable();
     places
 }
 
 /// Largest torque of either sign, N·m; 0 where none was recorded.
-pub(super) fn largest_torque(sessions: &[Session]) -> f64 {
-    let torques = sessions.iter().filter_map(|session| session.torque_n_m.as_ref()).flatten();
-    torques.fold(0.0, |most: f64, torque| most.max(torque.abs()))
-}
-
-/// Whether load changes at once, by more than its noise and its usual pace, near a row.
-fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
-    session.torque_n_m.as_ref().is_some_and(|torque| {
-        let around = &torque[row.saturating_sub(50)..(row + 50).min(torque.len())];
-        let mut paces: Vec<f64> = around.windows(2).map(|t| (t[1] - t[0]).abs()).collect();
-        let usual =
-            (LOAD_STEP * largest).max(LOAD_NOISE * white_noise([around])).max(LOAD_PACE * median_of(&mut paces));
-        let near = &torque[row.saturating_sub(4)..(row + 4).min(torque.len())];
-        largest > 0.0 && near.windows(2).any(|t| (t[1] - t[0]).abs() > usual)
-    })
-}
-
-/// Whether the error changes about as much in other rows near by: ringing, a change of speed, a traverse of the
-/// clearance.
-fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
-    let near = row.saturating_sub(APART).max(1)..(row + APART + 1).min(session.len());
-    near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
+pub(super) fn largest_torque(log: &Log) -> f64 {
+    log.of(Quantity::Torque).iter().fold(0.0, |most: f64, torque| most.max(torque.abs()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
 
     /// Sizes of the steps that last, of steps in some rows.
     fn left(steps: &[(usize, f64)]) -> Vec<f64> {
-        let step = |(row, size): &(usize, f64)| (StepPlace { session: 0, row: *row }, *size, 0.1);
-        lasting(steps.iter().map(step).collect()).into_iter().map(|(_, size, _)| size).collect()
+        let steps = steps.iter().map(|(row, size)| (*row, *size, 0.1)).collect();
+        lasting(&Log::default(), steps).into_iter().map(|(_, size, _)| size).collect()
     }
 
     #[test]
@@ -426,16 +402,17 @@ mod tests {
     #[test]
     fn a_large_slip_makes_no_slip_of_a_change_of_flank() {
         for slip_arcsec in [400.0, 3000.0] {
-            let sessions = flanks_that_friction_holds(slip_arcsec);
+            let mut sessions = flanks_that_friction_holds(slip_arcsec);
             let change = (1..2000).find(|row| sessions[1].torque_n_m.as_ref().unwrap()[*row] > 0.9).unwrap();
-            let at = |session: usize, row: usize| StepPlace { session, row };
             let gear = Gear::of_ratio(100.0);
-            let seen = Seen::of(&sessions, &gear);
-            let steps = [(at(0, 700), slip_arcsec * ARCSEC, ARCSEC), (at(1, change), 80.0 * ARCSEC, ARCSEC)];
-            assert!(seen.no_flank_was_changed(&steps, steps[0]));
-            assert!(!seen.no_flank_was_changed(&steps, steps[1]));
+            let steps = [(700, slip_arcsec * ARCSEC, ARCSEC), (2000 + change, 80.0 * ARCSEC, ARCSEC)];
             let mut findings = Findings::default();
-            check(&mut sessions.clone(), &gear, &mut findings);
+            Log::on(&mut sessions, |log| {
+                let seen = Seen::of(log, &gear);
+                assert!(seen.no_flank_was_changed(&steps, steps[0]));
+                assert!(!seen.no_flank_was_changed(&steps, steps[1]));
+                check(log, &gear, &mut findings);
+            });
             let found: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
             assert_eq!(found, [700], "{:?} {:?}", findings.faults, findings.notes);
         }

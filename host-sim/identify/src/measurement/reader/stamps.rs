@@ -1,4 +1,4 @@
-//! The order of rows by their stamps: newest first, unsorted, written twice.
+//! The order of rows by their stamps: newest first, unsorted.
 
 use flexspline_base::robust::{median_of, sampled};
 
@@ -10,9 +10,6 @@ const FALLING: f64 = 0.9;
 const UNSORTED: f64 = 0.05;
 /// Sorted rows are those of one clock if this share of their steps is within half of the usual one. *Guess*.
 const EVEN: f64 = 0.8;
-/// Share of rows that repeat the one before in a file in which rows are written twice; fewer are left to the check of
-/// the clock. *Guess*.
-const TWICE: f64 = 0.1;
 /// Fewest steps that show an order. *Guess*: fewer may fall by chance.
 const FEWEST: usize = 8;
 
@@ -40,21 +37,6 @@ pub fn order(time: &[f64]) -> Option<(Vec<usize>, String)> {
         (sorted, what)
     })
 }
-
-/// Which rows repeat the one before in all of these columns, where enough do that rows are written twice.
-pub(crate) fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
-    let rows = columns.first()?.len();
-    let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan());
-    let repeats: Vec<bool> =
-        (0..rows).map(|row| row > 0 && columns.iter().all(|values| same(values[row], values[row - 1]))).collect();
-    let count = repeats.iter().filter(|repeats| **repeats).count();
-    (count >= FEWEST && count as f64 > TWICE * rows as f64).then(|| {
-        let what =
-            format!("{count} of {rows} rows repeat the row before in every column, its time too: they are left out");
-        (repeats, what)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,14 +56,5 @@ mod tests {
         assert_eq!(order(&sessions), None);
         let stray: Vec<f64> = (0..200).map(|k| if k == 70 { 5.0 } else { time[k] }).collect();
         assert_eq!(order(&stray), None);
-    }
-
-    #[test]
-    fn rows_written_twice_are_found() {
-        let doubled: Vec<f64> = (0..100).map(|k| f64::from(k / 2)).collect();
-        let other: Vec<f64> = (0..100).map(f64::from).collect();
-        assert_eq!(twice(&[&doubled]).unwrap().0.iter().filter(|drop| **drop).count(), 50);
-        assert_eq!(twice(&[&doubled, &other]), None);
-        assert_eq!(twice(&[&other]), None);
     }
 }
