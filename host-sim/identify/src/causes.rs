@@ -7,7 +7,6 @@
 mod parameter;
 pub(crate) mod spec;
 
-use std::fmt;
 use std::str::FromStr;
 
 use serde::Serialize;
@@ -188,11 +187,7 @@ impl FromStr for CauseName {
     }
 }
 
-impl fmt::Display for CauseName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
-}
+shown_by_name!(CauseName::as_str);
 
 impl CauseName {
     /// Its entry in the table of causes.

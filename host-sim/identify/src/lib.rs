@@ -34,6 +34,17 @@ macro_rules! table {
     };
 }
 
+/// A type is shown by its name, which a method gives.
+macro_rules! shown_by_name {
+    ($Name:ident::$name:ident) => {
+        impl std::fmt::Display for $Name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.$name())
+            }
+        }
+    };
+}
+
 pub mod calibrate;
 pub mod causes;
 pub mod diagnosis;

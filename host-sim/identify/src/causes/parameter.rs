@@ -1,7 +1,6 @@
 //! Parameters of causes and of data faults: their names, kinds, ranges and usual values.
 
 use std::f64::consts::TAU;
-use std::fmt;
 
 use serde::Serialize;
 
@@ -94,11 +93,7 @@ impl ParameterName {
     }
 }
 
-impl fmt::Display for ParameterName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
-}
+shown_by_name!(ParameterName::as_str);
 
 /// Value of a parameter that is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]

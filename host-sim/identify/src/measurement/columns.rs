@@ -1,7 +1,5 @@
 //! Which column of a file holds what, and in which unit.
 
-use std::fmt;
-
 use thiserror::Error;
 
 use super::reader::{Layout, unit_word};
@@ -73,11 +71,7 @@ impl Quantity {
     }
 }
 
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
+shown_by_name!(Quantity::name);
 
 /// Options that say no mapping: what was found and what is allowed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -85,7 +79,7 @@ impl fmt::Display for Quantity {
 pub struct MappingError(String);
 
 impl MappingError {
-    fn of_columns(what: impl fmt::Display) -> MappingError {
+    fn of_columns(what: impl std::fmt::Display) -> MappingError {
         MappingError(format!(
             "--columns: {what}; for instance --columns generator=wave_gen_turns:turn,error=error_arcsec:arcsec"
         ))

@@ -1,7 +1,6 @@
 //! Units of columns, and how a written value becomes one: `deg`, `-N.m`, `count/16777216`, `A*3.5`, `V*20-0.4`.
 
 use std::f64::consts::TAU;
-use std::fmt;
 
 table! {
     /// Unit of a column, with its family, how people write it (its name in a mapping first) and its size in the unit
@@ -172,11 +171,7 @@ impl Unit {
     }
 }
 
-impl fmt::Display for Unit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
+shown_by_name!(Unit::name);
 
 /// How a number of a column is read: `gain · number + offset` in a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
