@@ -2,7 +2,7 @@
 //! half days.
 
 use jiff::Timestamp;
-use jiff::civil::{Date, DateTime, Time};
+use jiff::civil::{DateTime, Time};
 use jiff::fmt::strtime;
 
 /// Seconds of a day, by definition.
@@ -68,7 +68,7 @@ impl TimeForm {
             TimeForm::Written(form) => {
                 let read = strtime::parse(form, text.replace(',', ".")).ok()?;
                 match read.to_datetime() {
-                    Ok(at) => Some(Stamp { seconds: since_1970(at), has_date: true }),
+                    Ok(at) => Some(of_date(at)),
                     Err(_) if !form.contains("%Y") => Some(of_day(read.to_time().ok()?)),
                     Err(_) => None,
                 }
@@ -79,25 +79,21 @@ impl TimeForm {
 
 fn iso(text: &str) -> Option<Stamp> {
     if let Ok(at) = text.parse::<Timestamp>() {
-        let seconds = at.as_second() as f64 + 1e-9 * f64::from(at.subsec_nanosecond());
-        return Some(Stamp { seconds, has_date: true });
+        return Some(Stamp { seconds: at.as_duration().as_secs_f64(), has_date: true });
     }
     if let Ok(at) = text.parse::<DateTime>() {
         // A date alone is no time.
-        return text.contains([':', 'T']).then(|| Stamp { seconds: since_1970(at), has_date: true });
+        return text.contains([':', 'T']).then(|| of_date(at));
     }
     text.contains(':').then(|| text.parse().ok().map(of_day)).flatten()
 }
 
 fn of_day(time: Time) -> Stamp {
-    let whole = 3600 * i32::from(time.hour()) + 60 * i32::from(time.minute());
-    let seconds = f64::from(whole) + (f64::from(time.second()) + 1e-9 * f64::from(time.subsec_nanosecond()));
-    Stamp { seconds, has_date: false }
+    Stamp { seconds: time.duration_since(Time::midnight()).as_secs_f64(), has_date: false }
 }
 
-fn since_1970(at: DateTime) -> f64 {
-    let days = at.date().since(Date::constant(1970, 1, 1)).map_or(0, |since| since.get_days());
-    f64::from(days) * DAY_S + of_day(at.time()).seconds
+fn of_date(at: DateTime) -> Stamp {
+    Stamp { seconds: at.duration_since(DateTime::constant(1970, 1, 1, 0, 0, 0, 0)).as_secs_f64(), has_date: true }
 }
 
 #[cfg(test)]
