@@ -251,6 +251,14 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationErro
         taken.push(*pass);
         now = then;
     }
+    if taken.len() == MOST_PASSES {
+        let hours = bench.minutes / 60.0;
+        return Err(CalibrationError::Known(format!(
+            "--minutes: found {}: in {hours:.0} hours there is time for {MOST_PASSES} passes and more; allowed: less \
+             time",
+            bench.minutes
+        )));
+    }
     if taken.is_empty() {
         let shortest = candidates.iter().map(|(pass, _)| pass.duration_s).fold(f64::INFINITY, f64::min) / 60.0;
         return Err(CalibrationError::Known(format!(
