@@ -41,6 +41,21 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     assert!(!verdict.is_empty());
     assert!(verdict.iter().all(|step| step["passed"] == true), "{verdict:?}");
 
+    // The likeliest set is what was named; its evidence is the sum of what sessions, directions and loads give, but for
+    // what priors and the freedom of its shape cost.
+    let (cause, posterior) = (&diagnosis["causes"][0], diagnosis["posterior"].as_array().unwrap());
+    assert_eq!((&posterior[0]["set"][0], &posterior[0]["probability"]), (&cause["name"], &cause["confidence"]));
+    let sum = |values: &Value| -> f64 {
+        let each =
+            values.as_object().map(|by| by.values().collect()).or(values.as_array().map(|all| all.iter().collect()));
+        each.unwrap_or_else(Vec::new).into_iter().filter_map(Value::as_f64).sum()
+    };
+    let evidence = cause["evidence"].as_f64().unwrap();
+    for by in ["session", "direction", "load"] {
+        let of_all = sum(&cause["evidence_by"][by]);
+        assert!((evidence..1.2 * evidence + 50.0).contains(&of_all), "{by}: {of_all} of {evidence}");
+    }
+
     // A wheel pushed aside by gravity turns with another angle: refitted in the place of the cause, it explains the
     // data far worse.
     let rival = steps(&diagnosis, "gravity_side_load").into_iter().find(|step| step["stage"] == "rival").unwrap();

@@ -83,6 +83,10 @@ pub struct Cause {
     /// Probability that it is this one and not the best rival, given that it is one of the library.
     #[serde(serialize_with = "four_digits")]
     pub confidence: f64,
+    /// Evidence for it: natural logarithm of the ratio to the model without it.
+    pub evidence: f64,
+    /// Where that comes from.
+    pub evidence_by: EvidenceBy,
     /// Parameters; the unit is the end of the name.
     pub parameters: BTreeMap<&'static str, Parameter>,
     /// Share of the squared error left by the recalibrated nominal model that this cause removes in sessions it was not
@@ -95,6 +99,27 @@ pub struct Cause {
     /// What makes the same and is no cause of the library; it counts as one look-alike more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub look_alike_outside: Option<&'static str>,
+}
+
+/// By how much a cause lowers half the sum of the squared residuals, in units of the noise.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct EvidenceBy {
+    /// In each session that was fitted.
+    pub session: Vec<f64>,
+    /// In forward and backward motion of the generator.
+    pub direction: BTreeMap<&'static str, f64>,
+    /// Under light, middle and heavy loads: thirds of the largest.
+    pub load: BTreeMap<&'static str, f64>,
+}
+
+/// Causes that may be there together, and no others.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SetOfCauses {
+    /// The causes; none where what was found is outside the library, or nothing.
+    pub set: Vec<CauseName>,
+    /// Probability of the set.
+    #[serde(serialize_with = "four_digits")]
+    pub probability: f64,
 }
 
 impl Cause {
@@ -190,6 +215,8 @@ pub struct Diagnosis {
     pub finding: Finding,
     /// Causes, strongest first.
     pub causes: Vec<Cause>,
+    /// Sets of causes, likeliest first: each cause or what these data do not tell from it. Empty where none is named.
+    pub posterior: Vec<SetOfCauses>,
     /// Causes that gain too little to be named.
     pub hints: Vec<Hint>,
     /// Over all data.
@@ -266,6 +293,7 @@ impl Diagnosis {
         };
         let causes = std::mem::take(&mut self.causes);
         self.unexplained.extend(causes.into_iter().map(unnamed));
+        self.posterior.clear();
         self.hints.clear();
         (self.verdict, self.finding) = (Verdict::Unknown, Finding::DataUnusable);
         self.held_out.rms_after_arcsec = self.held_out.rms_before_arcsec;

@@ -8,7 +8,8 @@ use super::candidate::{Label, Law, Per, standing_pitch_error};
 use super::model::{Problem, Term, but};
 use super::noise::Noise;
 use super::report::{
-    Cause, Compensation, Diagnosis, Finding, HeldOut, Hint, Parameter, Residual, Unexplained, Verdict,
+    Cause, Compensation, Diagnosis, EvidenceBy, Finding, HeldOut, Hint, Parameter, Residual, SetOfCauses, Unexplained,
+    Verdict,
 };
 use super::select::{self, Selected, Standing, standings};
 use super::thresholds::selection::OUT_OF_TOLERANCE;
@@ -90,7 +91,7 @@ pub(super) fn conclude(
     for k in &named {
         trace.decided(Stage::Verdict, selected.terms[*k].law.label, None, vec![no_worse]);
     }
-    let mut causes = Vec::new();
+    let (mut causes, mut effects) = (Vec::new(), Vec::new());
     let mut next_experiment = None;
     if verdict != Verdict::Unknown {
         let of_all: Vec<Vec<rivals::RefittedCause<'_>>> = named
@@ -107,8 +108,9 @@ pub(super) fn conclude(
             let at_limit = at_limit(search, selected, k);
             let others = rivals.iter().filter(|r| r.alike() && !at_limit.contains(&r.cause));
             let all = at_limit.iter().map(|cause| (*cause, 0.0)).chain(others.map(|r| (r.cause, r.misfit)));
-            let (alike, misfits): (Vec<CauseName>, Vec<f64>) = all.take(3).unzip();
-            let closest = rivals.first().map_or(50.0, |r| r.misfit);
+            let misfits: Vec<(CauseName, f64)> = all.take(3).collect();
+            let alike: Vec<CauseName> = misfits.iter().map(|(cause, _)| *cause).collect();
+            let closest = rivals.first().map(|r| (r.cause, r.misfit));
             if !alike.is_empty() && next_experiment.is_none() {
                 let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
                 next_experiment = experiment::next(&problem.on, &selected.terms[k], selected.fit.of(k), &named, noise)
@@ -117,15 +119,19 @@ pub(super) fn conclude(
                     });
             }
             let look_alike_outside = outside(k, name, &known[k], selected, problem);
+            let shares = shares(name, &misfits, look_alike_outside.is_some(), closest, known[k].size_told);
             causes.push(Cause {
                 name,
-                confidence: confidence(&misfits, look_alike_outside.is_some(), closest, known[k].size_told),
+                confidence: shares[0].1,
+                evidence: standings[k].evidence,
+                evidence_by: evidence_by(problem, selected, k),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
                 size_arcsec: standings[k].size,
                 look_alikes: alike_with_wheel(name, alike, &known[k], problem.on.nominal),
                 look_alike_outside,
             });
+            effects.push(shares);
         }
         causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
     }
@@ -168,6 +174,7 @@ pub(super) fn conclude(
         verdict,
         finding: Finding::of(verdict),
         causes,
+        posterior: posterior(&effects),
         hints,
         residual: Residual {
             rms_before_arcsec: rms_before,
@@ -423,18 +430,83 @@ fn load_makes_it(cause: Option<CauseName>, problem: &Problem<'_>) -> bool {
     !problem.on.rows.recorded.torque && cause.is_some_and(|cause| cause.spec().made_by_loads)
 }
 
-/// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the
-/// closest rival. Less where its size is distinguished from zero by few standard deviations (`size_told`).
-fn confidence(alike: &[f64], double_outside: bool, closest: f64, size_told: f64) -> f64 {
+/// A cause of the library, or none, that one effect in the data may be of, and the probability of that.
+type Share = (Option<CauseName>, f64);
+
+/// No law is known so well that this share is not left to what no law describes. *Guess*.
+const OF_NO_LAW: f64 = 0.01;
+
+/// Sets that are less probable are not stated: half of the last of four digits.
+const LEAST_STATED: f64 = 5e-5;
+
+/// What the effect that was found as `name` may be, that first: its look-alikes, whose misfits are higher by these, or
+/// something outside the library; if there is neither, the closest rival. Where its size is distinguished from zero by
+/// few standard deviations (`size_told`) there may be nothing.
+fn shares(
+    name: CauseName,
+    alike: &[(CauseName, f64)],
+    outside: bool,
+    closest: Option<(CauseName, f64)>,
+    size_told: f64,
+) -> Vec<Share> {
     let odds = |misfit: f64| (-0.5 * misfit.clamp(0.0, 40.0)).exp();
-    let among = if alike.is_empty() && !double_outside {
-        1.0 / (1.0 + odds(closest)) - 0.01
-    } else {
-        1.0 / (1.0
-            + f64::from(u8::from(double_outside))
-            + alike.iter().map(|misfit| odds(*misfit).max(LEAST_WEIGHT)).sum::<f64>())
-    };
-    if size_told < SIZE_KNOWN { among.min(MOST_OF_UNSURE) } else { among }
+    let mut shares: Vec<Share> = vec![(Some(name), 1.0)];
+    shares.extend(alike.iter().map(|(cause, misfit)| (Some(*cause), odds(*misfit).max(LEAST_WEIGHT))));
+    shares.extend(outside.then_some((None, 1.0)));
+    let alone = shares.len() == 1;
+    shares.extend(closest.filter(|_| alone).map(|(rival, misfit)| (Some(rival), odds(misfit))));
+    let all: f64 = shares.iter().map(|(_, weight)| weight).sum();
+    shares.iter_mut().for_each(|(_, weight)| *weight /= all);
+    let sure = shares[0].1 - if alone { OF_NO_LAW } else { 0.0 };
+    let sure = if size_told < SIZE_KNOWN { sure.min(MOST_OF_UNSURE) } else { sure };
+    shares.push((None, shares[0].1 - sure));
+    shares[0].1 = sure;
+    shares
+}
+
+/// The sets of causes that effects may be of, each by itself, likeliest first; nothing without an effect.
+fn posterior(effects: &[Vec<Share>]) -> Vec<SetOfCauses> {
+    let mut sets: BTreeMap<Vec<CauseName>, f64> =
+        (!effects.is_empty()).then(|| (Vec::new(), 1.0)).into_iter().collect();
+    for effect in effects {
+        let mut with = BTreeMap::new();
+        for (set, probability) in &sets {
+            for (cause, share) in effect.iter().filter(|(_, share)| *share > 0.0) {
+                let mut set: Vec<CauseName> = set.iter().chain(cause).copied().collect();
+                set.sort_unstable();
+                set.dedup();
+                *with.entry(set).or_insert(0.0) += probability * share;
+            }
+        }
+        sets = with;
+    }
+    let mut sets: Vec<SetOfCauses> =
+        sets.into_iter().map(|(set, probability)| SetOfCauses { set, probability }).collect();
+    sets.retain(|of| of.probability >= LEAST_STATED);
+    sets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    sets
+}
+
+/// Where the evidence for term `k` comes from.
+fn evidence_by(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> EvidenceBy {
+    let mut by = EvidenceBy::default();
+    let Some(without) = selected.without(problem, k) else { return by };
+    let white = |of: &Selected<'_>| problem.whitener.whiten_averaged(&remainder::left(problem, of));
+    let (with, without, rows) = (white(selected), white(&without), problem.on.rows);
+    for session in &problem.whitener.sessions {
+        let mut of_session = 0.0;
+        for j in session.clone() {
+            let gain = 0.5 * problem.fineness.worth * (without[j].powi(2) - with[j].powi(2));
+            let row = problem.whitener.groups[j].start;
+            let third = 3.0 * rows.torque[row].abs() / problem.on.scales.load;
+            let direction = if rows.direction[row] < 0.0 { "backward" } else { "forward" };
+            *by.direction.entry(direction).or_default() += gain;
+            *by.load.entry(["light", "middle", "heavy"][(third as usize).min(2)]).or_default() += gain;
+            of_session += gain;
+        }
+        by.session.push(of_session);
+    }
+    by
 }
 
 fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
@@ -495,18 +567,44 @@ mod tests {
 
     #[test]
     fn a_confidence_is_that_of_a_name_among_those_alike() {
-        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} for {b}");
+        use CauseName::{RatioError, SensorLatency, Wear};
+        let of = |alike: &[f64], outside: bool, closest: f64, told: f64| {
+            let alike: Vec<_> = alike.iter().zip([RatioError, Wear]).map(|(misfit, cause)| (cause, *misfit)).collect();
+            let shares = shares(SensorLatency, &alike, outside, Some((RatioError, closest)), told);
+            near(shares.iter().map(|(_, share)| share).sum(), 1.0);
+            shares[0].1
+        };
         // Told no worse, or better: one of these.
-        near(confidence(&[0.0], false, 0.0, 20.0), 0.5);
-        near(confidence(&[-30.0, 0.0], false, -30.0, 20.0), 1.0 / 3.0);
+        near(of(&[0.0], false, 0.0, 20.0), 0.5);
+        near(of(&[-30.0, 0.0], false, -30.0, 20.0), 1.0 / 3.0);
         // Told worse, though no law is known so well.
-        near(confidence(&[2.0], false, 2.0, 20.0), 1.0 / (1.0 + (-1.0_f64).exp()));
-        near(confidence(&[900.0], false, 900.0, 20.0), 1.0 / (1.0 + LEAST_WEIGHT));
+        near(of(&[2.0], false, 2.0, 20.0), 1.0 / (1.0 + (-1.0_f64).exp()));
+        near(of(&[900.0], false, 900.0, 20.0), 1.0 / (1.0 + LEAST_WEIGHT));
         // None alike.
-        assert!((0.98..0.99).contains(&confidence(&[], false, 900.0, 20.0)));
+        assert!((0.98..0.99).contains(&of(&[], false, 900.0, 20.0)));
         // A double that is no cause of the library; a size that is hardly known.
-        near(confidence(&[], true, 900.0, 20.0), 0.5);
-        near(confidence(&[], false, 900.0, 4.0), MOST_OF_UNSURE);
-        near(confidence(&[0.0], false, 0.0, 4.0), 0.5);
+        near(of(&[], true, 900.0, 20.0), 0.5);
+        near(of(&[], false, 900.0, 4.0), MOST_OF_UNSURE);
+        near(of(&[0.0], false, 0.0, 4.0), 0.5);
+    }
+
+    #[test]
+    fn a_posterior_is_of_sets_in_which_no_cause_is_twice() {
+        use CauseName::{RatioError, SensorLatency, Wear};
+        assert!(posterior(&[]).is_empty());
+        let two = [vec![(Some(Wear), 0.6), (Some(RatioError), 0.4)], vec![(Some(RatioError), 0.9), (None, 0.1)]];
+        let sets = posterior(&two);
+        let of = |set: &[CauseName]| sets.iter().find(|of| of.set == set).map_or(0.0, |of| of.probability);
+        let mut both = [Wear, RatioError];
+        both.sort_unstable();
+        near(of(&both), 0.54);
+        near(of(&[RatioError]), 0.4 * 0.9 + 0.4 * 0.1);
+        near(of(&[Wear]), 0.06);
+        assert_eq!((sets[0].set.as_slice(), sets.len()), (&both[..], 3));
+        near(of(&[SensorLatency]), 0.0);
+    }
+
+    fn near(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-9, "{a} for {b}");
     }
 }

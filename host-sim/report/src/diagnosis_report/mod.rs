@@ -627,6 +627,8 @@ mod tests {
         let cause = |name: &CauseName| Cause {
             name: *name,
             confidence: 0.97,
+            evidence: 40.0,
+            evidence_by: Default::default(),
             parameters: BTreeMap::new(),
             held_out_gain: 0.8,
             size_arcsec: 12.0,
@@ -646,6 +648,7 @@ mod tests {
                 rows_averaged: 1,
             },
             held_out: HeldOut { rms_before_arcsec: 10.0, rms_after_arcsec: 5.0 },
+            posterior: Vec::new(),
             hints: Vec::new(),
             compensation: Compensation::default(),
             unexplained: vec![Unexplained { looks_like: "slow motion".into(), size_arcsec: 30.0 }],
