@@ -203,6 +203,8 @@ await check("a log dropped on the first page leads to a verdict and a table that
   const verdict = await until(page, "verdict");
   const ms = Date.now() - begun;
   assert(/^(not_understood|fault_found|nothing_found) \d+$/.test(verdict), verdict);
+  const headline = await page.locator("#verdict-words").textContent();
+  assert(/ \(\d+ %\)/.test(headline) === verdict.startsWith("fault_found"), headline);
   assert((await page.locator("#causes-table input[type=checkbox]").count()) > 15, "candidate causes");
   assert(await page.locator("#residual canvas").count(), "no residual picture");
   const table = await download(page, "calibrated.fxt", "log.fxt");

@@ -31,6 +31,8 @@ const ROWS_SHOWN = 6;
 const SHORT_LOG = 100_000;
 const SEPARATORS = { comma: /,/, semicolon: /;/, tab: /\t/, bar: /\|/, blanks: /\s+/, "comma and blank": /[,\s]+/ };
 const CERTAIN = 0.75;
+/** Sets of causes in the headline of a verdict are at least so probable. */
+const WORTH_SAYING = 0.05;
 
 /** Its role in a mapping. */
 const roleOf = (column) => {
@@ -59,6 +61,7 @@ export async function logBench(view, asked, bench) {
     known: asked.get("known") ?? "ratio",
     stiffness: asked.get("stiffness") ?? "",
     backlash: asked.get("backlash") ?? "",
+    drag: asked.get("drag") ?? "",
     teeth: asked.get("teeth") ?? "",
     without: new Set(asked.getAll("without")),
   };
@@ -68,7 +71,7 @@ export async function logBench(view, asked, bench) {
     ...(now.ratio ? [["ratio", now.ratio]] : []),
     ["known", now.known],
     ...(now.known === "ratio"
-      ? ["stiffness", "backlash", "teeth"].filter((key) => now[key]).map((key) => [key, now[key]])
+      ? ["stiffness", "backlash", "drag", "teeth"].filter((key) => now[key]).map((key) => [key, now[key]])
       : []),
     ...[...now.without].map((cause) => ["without", cause]),
   ];
@@ -355,9 +358,10 @@ export async function logBench(view, asked, bench) {
       input("ratio", "Ratio (negative: they turn opposite ways)", "ratio"),
       input("stiffness", "Stiffness of the catalogue, N·m/rad", "stiffness"),
       input("backlash", "Backlash, arcsec", "backlash"),
+      input("drag", "Friction of the output, N·m, if known", "drag"),
       input("teeth", "Teeth of the flexspline, if known", "teeth"),
       el("small", {
-        text: "Names of causes depend on stiffness (where a torque was recorded) and backlash; the table needs neither. With the number of teeth (ratio 100: 200) causes in the teeth are considered too.",
+        text: "Names of causes depend on stiffness (where a torque was recorded) and backlash; the table needs neither. A friction that is not given is fitted. With the number of teeth (ratio 100: 200) causes in the teeth are considered too.",
       }),
     );
     numbers.hidden = now.known !== "ratio";
@@ -405,13 +409,13 @@ export async function logBench(view, asked, bench) {
         );
       drive = `flexspline_teeth = ${teeth}\ncircular_spline_teeth = ${teeth + 2}\nfixed = "${fixed}"`;
     }
-    const text = `# Written by the bench: a drive by its ratio or teeth and two figures of its catalogue.
+    const text = `# Written by the bench: a drive by its ratio or teeth and figures of its catalogue.
 [drive]
 ${drive}
 [nominal]
 stiffness_n_m_per_rad = ${Number(now.stiffness) || 1e6}
 backlash_arcsec = ${Number(now.backlash)}
-`;
+${Number(now.drag) ? `friction_torque_n_m = ${Number(now.drag)}\n` : ""}`;
     return sendFile("nominal-bench.toml", new Blob([text]));
   }
 
@@ -618,11 +622,17 @@ backlash_arcsec = ${Number(now.backlash)}
       not_understood: "Not understood: there is something that no cause of the library explains",
       data_unusable: "These data say nothing of the unit",
     };
+    const odds = d.posterior
+      .filter(({ probability }) => probability >= WORTH_SAYING)
+      .map(({ set, probability }) => {
+        const names = set.map((name) => name.replaceAll("_", " ")).join(" and ") || "no cause of the library";
+        return `${names} (${Math.round(100 * probability)} %)`;
+      });
     verdict.replaceChildren(
       el("p", {
         class: "verdict",
         id: "verdict-words",
-        text: `${said[d.finding] ?? d.verdict}${d.causes.length ? `: ${d.causes.map((c) => c.name.replaceAll("_", " ")).join(", ")}` : ""}.`,
+        text: `${said[d.finding] ?? d.verdict}${odds.length ? `: ${odds.join(", or ")}` : ""}.`,
       }),
       el(
         "p",
