@@ -85,6 +85,8 @@ pub struct ReplaySummary {
     pub mean_residual_arcsec: f64,
     /// Rows by quality: in range, uncertain, extrapolated, disabled.
     pub rows_by_quality: [usize; 4],
+    /// The load at which torques from the wind-up are zero: `no load`, or, of rows without a torque, `mean row`.
+    pub torque_counts_from: &'static str,
     /// Residual of the table with the torque's sign turned, arcsec rms, where the rows show that it is.
     pub torque_turned_rms_arcsec: Option<f64>,
     /// Residual of the table with another spring and another wave of the output, arcsec rms, where the load goes with
@@ -345,6 +347,7 @@ pub fn replay(
         max_residual_arcsec: off.iter().copied().fold(0.0, f64::max),
         mean_residual_arcsec,
         rows_by_quality: by_quality,
+        torque_counts_from: if rows.iter().any(|row| row.torque_n_m != 0.0) { "no load" } else { "mean row" },
         torque_turned_rms_arcsec,
         other_load_rms_arcsec,
         rows_of: None,

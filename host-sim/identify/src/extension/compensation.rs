@@ -93,6 +93,9 @@ impl Evaluation {
             or_none(left.rms_calibrated_table_arcsec),
             or_none(extended)
         );
+        if self.not_applied.iter().any(|cause| cause.reason == OF_THE_OUTPUT_ENCODER) {
+            text += "; without the error of the output's encoder, which no table has and replay counts";
+        }
         self.not_made.iter().for_each(|why| text += &format!("; {why}"));
         text
     }
