@@ -176,7 +176,7 @@ impl Recorded {
             PartName::Play if !(super::BOTH_WAYS..=1.0 - super::BOTH_WAYS).contains(&self.backward_share) => {
                 Some(format!(
                     "{:.0} % of the motion is backward: one direction alone says nothing of the play",
-                    100.0 * self.backward_share
+                    100.0 * self.backward_share.abs()
                 ))
             }
             PartName::GeneratorAngle if self.generator_share < super::MOST_OF_A_TURN => {

@@ -10,7 +10,7 @@ use super::report::Unexplained;
 use super::rows::{Rows, combined, rms};
 use super::select::{self, Selected, less};
 use super::thresholds::remainder::*;
-use crate::residual::strongest;
+use crate::residual::{is_no_noise, strongest};
 
 /// Highest order per generator turn up to which lines are looked for. *Guess*: above what bearings make, below the
 /// tooth mesh of ratios above 75, which has models of its own.
@@ -66,7 +66,7 @@ pub(crate) fn lines(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
         // In innovations of variance v a line of amplitude a has the power n a² / 4 v.
         let size_arcsec = noise.white * rms(&every) * (2.0 * power / count).sqrt();
         // White noise of n rows reaches this power once in about 10⁵ spectra.
-        let is_there = power > (count * 4.0).ln() + 12.0 && size_arcsec > least;
+        let is_there = is_no_noise(power, every.len()) && size_arcsec > least;
         is_there.then_some(SpectralLine { per, order, size_arcsec })
     };
     let by_angle = || line(Per::GeneratorTurn, 0.0, HIGHEST_ORDER.min(rows.highest_order()));

@@ -12,8 +12,8 @@ mod spectrum;
 
 pub use orders::{Line, NamedOrder, harmonics, named_orders};
 pub use rows::{Axis, SizeMismatch};
-pub(crate) use spectrum::strongest;
 pub use spectrum::{OrderSpectrum, Peak, order_spectrum};
+pub(crate) use spectrum::{is_no_noise, strongest};
 
 use rayon::prelude::*;
 use serde::Serialize;

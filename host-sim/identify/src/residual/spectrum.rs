@@ -203,6 +203,11 @@ pub(crate) fn strongest(angle: &[f64], value: &[f64], lowest: f64, highest: f64)
     Some((summit(&orders, &scan, best), 0.25 * rows * rows * scan[best] / total.max(1e-30)))
 }
 
+/// Whether the strongest line of some rows is too strong for noise. *Guess*: odds of e^12 against a chance.
+pub(crate) fn is_no_noise(power: f64, rows: usize) -> bool {
+    power > (4.0 * rows as f64).ln() + 12.0
+}
+
 /// Rows shared out on a grid, and what of the spectrum depends on the angles alone.
 struct Grid<'a> {
     angle: &'a [f64],
