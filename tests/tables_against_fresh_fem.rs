@@ -87,6 +87,7 @@ fn tables_hold_between_their_nodes_and_across_a_reversal() {
     desk.line("simulate --generator cam --mesh coarse --path pitch --torque-n-m 30 --out run").done();
     desk.line("replay --tables made/cam.fxt run/results.csv --out replayed").done();
     let summary = json(&desk, "replayed/summary.json");
+    assert_eq!(summary["torque_counts_from"], "no load");
     let left = summary["max_residual_arcsec"].as_f64().unwrap();
     println!("replay at 30 N·m: largest residual {left:.3}\"");
     assert!(left < 0.5 && summary["mean_residual_arcsec"].as_f64().unwrap().abs() < 1.0, "{summary}");

@@ -371,6 +371,9 @@ fn noise_makes_no_table_and_lone_parts_no_others() {
     for seed in 0..6 {
         let nothing = calibrate(&[recording(seed, |_, _, _, _| 0.0)], &prior);
         assert!(matches!(nothing, Err(CalibrationError::NothingGained(_))), "seed {seed}");
+        let degrees = [recording(seed, |psi, _, _, _| 8.0 * (20.0 * psi.to_radians()).sin())];
+        let asked = [nothing, calibrate(&degrees, &prior)].map(|made| made.map(|_| ()).unwrap_err().to_string());
+        assert!(!asked[0].contains("in 360") && asked[1].contains("20 waves in 360"), "seed {seed}: {asked:?}");
         let one = calibrate(&[recording(seed, |psi, _, _, _| 8.0 * (2.0 * psi).sin())], &prior).unwrap();
         assert_eq!(kept(&one.calibration), ["generator_angle"], "seed {seed}");
     }
