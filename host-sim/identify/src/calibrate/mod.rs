@@ -951,8 +951,8 @@ fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
     )
 }
 
-/// Waves that repeat every 360 of an angle's units, within this share of a wave, say that these are degrees. *Guess*: the
-/// order of a line is known to a part of one over the turns recorded.
+/// Waves that repeat every 360 of an angle's units, within this share of a wave, say that these are degrees. *Guess*:
+/// the order of a line is known far better in some turns.
 const WHOLE_WAVES: f64 = 0.02;
 
 /// Asks whether the generator's angle is in degrees, where the error has a line that repeats every 360 of its units. No
