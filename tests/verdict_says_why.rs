@@ -46,9 +46,11 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     let (cause, posterior) = (&diagnosis["causes"][0], diagnosis["posterior"].as_array().unwrap());
     assert_eq!((&posterior[0]["set"][0], &posterior[0]["probability"]), (&cause["name"], &cause["confidence"]));
     let sum = |values: &Value| -> f64 {
-        let each =
-            values.as_object().map(|by| by.values().collect()).or(values.as_array().map(|all| all.iter().collect()));
-        each.unwrap_or_else(Vec::new).into_iter().filter_map(Value::as_f64).sum()
+        let each: Vec<&Value> = match values {
+            Value::Object(by) => by.values().collect(),
+            all => all.as_array().into_iter().flatten().collect(),
+        };
+        each.into_iter().filter_map(Value::as_f64).sum()
     };
     let evidence = cause["evidence"].as_f64().unwrap();
     for by in ["session", "direction", "load"] {
