@@ -114,6 +114,8 @@ fn tried(program: &Path, table: &[u8], seed: u64) -> Result<Tried, String> {
         let there: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
         let missing = files.iter().any(|file| !there.iter().any(|name| name == file));
         let end = match code {
+            // A generator that stands under a load that goes round makes no table.
+            Some(0) if there == ["torque_loop.json"] => Ok("torque loop".to_owned()),
             Some(0) if missing || there.iter().any(|name| name.starts_with('.')) => Err(format!("leaves {there:?}")),
             Some(0) => found(command, &out, &printed),
             Some(1 | 2) if !there.is_empty() => Err(format!("leaves {there:?}")),
