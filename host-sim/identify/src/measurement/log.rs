@@ -205,6 +205,9 @@ impl Log {
 
     /// Leaves out the rows for which `drop` is true.
     pub(crate) fn leave_out(&mut self, drop: &[bool]) {
+        if !drop.contains(&true) {
+            return;
+        }
         self.line = kept(&self.line, drop);
         self.session = kept(&self.session, drop);
         self.columns.iter_mut().chain([&mut self.loudness]).flatten().for_each(|values| *values = kept(values, drop));
