@@ -347,7 +347,7 @@ pub fn replay(
         max_residual_arcsec: off.iter().copied().fold(0.0, f64::max),
         mean_residual_arcsec,
         rows_by_quality: by_quality,
-        torque_counts_from: if rows.iter().any(|row| row.torque_n_m != 0.0) { "no load" } else { "mean row" },
+        torque_counts_from: if has_torque(rows) { "no load" } else { "mean row" },
         torque_turned_rms_arcsec,
         other_load_rms_arcsec,
         rows_of: None,
@@ -358,6 +358,11 @@ pub fn replay(
     };
     summary.of_rows(None, table);
     (replayed, summary)
+}
+
+/// Whether rows have a torque; without one torques from the wind-up count from that of the mean row.
+pub(crate) fn has_torque(rows: &[MeasuredRow]) -> bool {
+    rows.iter().any(|row| row.torque_n_m != 0.0)
 }
 
 /// Torques that the wind-up says, each with its least and its most. The intervals are of what the calibration left, or
@@ -373,7 +378,7 @@ fn torques_read(
     let noise_arcsec = white_noise([&errors[..]]);
     let half_width_arcsec = if let Some(calibrated) = &calibrated {
         calibrated.half_width_arcsec.max(OF_95 * noise_arcsec)
-    } else if rows.iter().any(|row| row.torque_n_m != 0.0) {
+    } else if has_torque(rows) {
         quantile_of(&mut off_arcsec.to_vec(), INSIDE)
     } else {
         OF_95 * noise_arcsec.hypot(f64::from(table.projection_rms_rad()) * ARCSEC_PER_RAD)

@@ -14,7 +14,7 @@ use flexspline::{Direction, GeneratorAngle, PlayState, Table};
 use flexspline_design::tables::SlipSpring;
 use serde::{Deserialize, Serialize};
 
-use crate::replay::{MeasuredRow, by_core};
+use crate::replay::{MeasuredRow, by_core, has_torque};
 use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -189,7 +189,7 @@ pub(crate) fn along<R>(
     hysteresis: &Hysteresis,
     mut read: impl FnMut(&mut WindUpCurve<'_>, &MeasuredRow, f64) -> R,
 ) -> Vec<R> {
-    let has_torque = rows.iter().any(|row| row.torque_n_m != 0.0);
+    let has_torque = has_torque(rows);
     let mut all = Vec::with_capacity(rows.len());
     for rows in rows.chunk_by(|row, next| !has_torque || row.session == next.session) {
         let mut held = HeldTorques::default();
