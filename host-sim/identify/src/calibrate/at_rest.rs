@@ -234,6 +234,7 @@ impl TorqueLoop {
             let half_width = OF_95_OF_BLOCKS * jackknife(&without);
             LoopFigure { value: value[k], half_width: if k == 0 { half_width.hypot(of_laws) } else { half_width } }
         };
+        let worse = if apart > 0.0 { "play" } else { "hertz" };
         Some(TorqueLoop {
             rows: rows.len(),
             most_n_m,
@@ -241,11 +242,7 @@ impl TorqueLoop {
             knee_n_m: knee * most_n_m,
             exponent: figure(1),
             loss_arcsec: figure(2),
-            rejects: (apart.abs() > OF_95_OF_BLOCKS * jackknife(&without)).then_some(if apart > 0.0 {
-                "play"
-            } else {
-                "hertz"
-            }),
+            rejects: (apart.abs() > OF_95_OF_BLOCKS * jackknife(&without)).then_some(worse),
         })
     }
 }

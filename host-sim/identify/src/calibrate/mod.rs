@@ -954,6 +954,8 @@ fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
 /// Waves that repeat every 360 of an angle's units, within this share of a wave, say that these are degrees. *Guess*:
 /// the order of a line is known far better in some turns.
 const WHOLE_WAVES: f64 = 0.02;
+/// They are looked for up to this order of the angle, of which 360 units would have 28 waves. *Guess*.
+const HIGHEST_OF_DEGREES: f64 = 0.5;
 
 /// Asks whether the generator's angle is in degrees, where the error has a line that repeats every 360 of its units. No
 /// size is changed by that.
@@ -964,7 +966,7 @@ fn in_degrees(files: &[Recording]) -> Option<String> {
     let (angle, error) = (all(|session| &session.generator_rad), all(|session| &session.error_rad));
     let middle = mean(&error);
     let about: Vec<f64> = error.iter().map(|error| error - middle).collect();
-    let (order, power) = strongest(&angle, &about, 0.0, 0.5)?;
+    let (order, power) = strongest(&angle, &about, 0.0, HIGHEST_OF_DEGREES)?;
     let waves = order.to_degrees();
     let whole = waves.round() >= 1.0 && (waves - waves.round()).abs() < WHOLE_WAVES;
     (whole && is_no_noise(power, error.len())).then(|| {

@@ -65,7 +65,6 @@ pub(crate) fn lines(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
         let (order, power) = strongest(&places(rows, per), &every, lowest, highest)?;
         // In innovations of variance v a line of amplitude a has the power n a² / 4 v.
         let size_arcsec = noise.white * rms(&every) * (2.0 * power / count).sqrt();
-        // White noise of n rows reaches this power once in about 10⁵ spectra.
         let is_there = is_no_noise(power, every.len()) && size_arcsec > least;
         is_there.then_some(SpectralLine { per, order, size_arcsec })
     };

@@ -115,6 +115,10 @@ pub mod verdict {
     /// … and below, a name is stated with no more than this. *Chosen*: of 21 between the two 16 were there, of 183
     /// beyond 177.
     pub(crate) const MOST_OF_UNSURE: f64 = 0.85;
+    /// No law is known so well that this share is not left to what no law describes. *Guess*.
+    pub(crate) const OF_NO_LAW: f64 = 0.01;
+    /// Sets of causes that are less probable are not stated. *Source*: by definition, half of the last of four digits.
+    pub(crate) const LEAST_STATED: f64 = 5e-5;
     /// What a look-alike that the data tell worse weighs against a cause, at least: it is alike as no law is known any
     /// better. *Chosen*: of 41 causes with such look-alikes 37 were there, of 25 with one that the data tell no worse
     /// 14.

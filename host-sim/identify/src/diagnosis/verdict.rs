@@ -433,12 +433,6 @@ fn load_makes_it(cause: Option<CauseName>, problem: &Problem<'_>) -> bool {
 /// A cause of the library, or none, that one effect in the data may be of, and the probability of that.
 type Share = (Option<CauseName>, f64);
 
-/// No law is known so well that this share is not left to what no law describes. *Guess*.
-const OF_NO_LAW: f64 = 0.01;
-
-/// Sets that are less probable are not stated: half of the last of four digits.
-const LEAST_STATED: f64 = 5e-5;
-
 /// What the effect that was found as `name` may be, that first: its look-alikes, whose misfits are higher by these, or
 /// something outside the library; if there is neither, the closest rival. Where its size is distinguished from zero by
 /// few standard deviations (`size_told`) there may be nothing.

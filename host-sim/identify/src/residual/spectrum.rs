@@ -203,7 +203,8 @@ pub(crate) fn strongest(angle: &[f64], value: &[f64], lowest: f64, highest: f64)
     Some((summit(&orders, &scan, best), 0.25 * rows * rows * scan[best] / total.max(1e-30)))
 }
 
-/// Whether the strongest line of some rows is too strong for noise. *Guess*: odds of e^12 against a chance.
+/// Whether the strongest line of some rows is too strong for noise: white noise reaches that power once in about 10⁵
+/// spectra.
 pub(crate) fn is_no_noise(power: f64, rows: usize) -> bool {
     power > (4.0 * rows as f64).ln() + 12.0
 }
