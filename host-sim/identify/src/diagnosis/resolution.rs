@@ -2,6 +2,8 @@
 //! row: the tooth mesh, at z periods per generator turn. So the differences that averaging would throw away are looked
 //! at first, for the laws that live in them; where one shows, every row is kept.
 
+use rayon::prelude::*;
+
 use super::candidate::{Excitation, Law, Tolerance};
 use super::noise::Whitener;
 use super::rows::{Rows, combined, rms, robust_std};
@@ -33,10 +35,10 @@ pub(crate) fn hidden_by_averages(
     }
     let left = on.left(explained);
     let averages = Whitener::plain(on.rows, uncertain, stride, 1.0);
-    laws.iter()
+    laws.par_iter()
         .filter(|law| law.named() && law.shapes.is_empty())
         .filter_map(|law| hidden(on, law, &averages))
-        .find_map(|main| explained_in_detail(on.rows, &main, &left, uncertain))
+        .find_map_first(|main| explained_in_detail(on.rows, &main, &left, uncertain))
 }
 
 /// The main columns of a law, if averages hide all of them.

@@ -6,6 +6,8 @@
 
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use super::WIDEST_CLEARANCE_RAD;
 use super::steps::largest_torque;
 use crate::least_squares::add_scaled;
@@ -64,7 +66,7 @@ pub(super) struct StateFit {
 }
 
 /// A column in addition to those of the state.
-pub(super) type Extra<'a> = &'a dyn Fn(usize) -> f64;
+pub(super) type Extra<'a> = &'a (dyn Fn(usize) -> f64 + Sync);
 
 impl<'a> StateModel<'a> {
     pub fn new(log: &'a Log, gear: &Gear) -> Self {
@@ -127,14 +129,13 @@ impl<'a> StateModel<'a> {
 
     /// The error freed of what a fit of the state and `extras` says.
     pub fn left(&self, fit: &StateFit, extras: &[Extra]) -> Vec<f64> {
-        let mut columns = Vec::new();
-        let left = |(row, error): (usize, &f64)| {
+        let left = |columns: &mut Vec<f64>, (row, error): (usize, &f64)| {
             columns.clear();
-            self.fill(row, &mut columns);
+            self.fill(row, columns);
             columns.extend(extras.iter().map(|extra| extra(row)));
             error - columns.iter().zip(&fit.value).map(|(column, value)| column * value).sum::<f64>()
         };
-        self.log.of(Quantity::Error).iter().enumerate().map(left).collect()
+        self.log.of(Quantity::Error).par_iter().enumerate().map_init(Vec::new, left).collect()
     }
 
     /// Rows spread evenly, with the columns of the state.
