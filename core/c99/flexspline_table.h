@@ -383,8 +383,8 @@ bool fxt_encoder_start(fxt_encoder *encoder, uint64_t reading, int64_t near_coun
  * that was believed last, for N ticks; in N + 2 the generator cannot make half of what the register counts. So the turns are right as soon as the
  * readings are, if no more than N - 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at 500 rad/s. After
  * more the encoder is lost (fxt_encoder_is_lost): call fxt_encoder_start with what is known otherwise. Wrong readings that agree with each other
- * until the generator could have got there are believed: nothing tells them from motion. A tick that is missed counts as one of the N at this
- * call, as two at later ones. False, and nothing else changes: the encoder is lost; the register cannot read that; there is no joint or no
+ * for longer than patience, or until the generator could have got there, are believed, as nothing tells them from motion: then, too, start it
+ * anew. A tick that is missed counts as one of the N at this call, as two at later ones. False, and nothing else changes: the encoder is lost; the register cannot read that; there is no joint or no
  * encoder; or generator_rate_rad_s allows a sixth of what the register counts in a tick, so that motion hides a wrong bit. Give the tick no
  * sample then. */
 bool fxt_joint_read(const fxt_joint *joint, fxt_encoder *encoder, uint64_t reading, int64_t *angle);
