@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flexspline::Table;
 use serde::{Deserialize, Serialize};
 
+use super::channels::waves;
 use super::flank_lag::{behind, flank_lag};
 use super::rows::Rows;
 use crate::least_squares::FreeSpan;
@@ -282,12 +283,14 @@ impl Base {
     }
 }
 
-/// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong
-/// ratio are taken out before: any drive may have them, whatever its play does, and they would decide between the laws.
+/// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading, a wrong
+/// ratio and waves of the output are taken out before: any drive may have them, whatever its play does, and they would
+/// decide between the laws.
 fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
     let used: Vec<usize> = rows.sessions_used().flatten().collect();
     let of = |column: &[f64]| -> Vec<f64> { used.iter().map(|k| column[*k]).collect() };
-    let free = FreeSpan::default().beyond([vec![1.0; used.len()], of(&rows.speed), of(&rows.output)]);
+    let any = [vec![1.0; used.len()], of(&rows.speed), of(&rows.output)].into_iter();
+    let free = FreeSpan::default().beyond(any.chain([1.0, 2.0].iter().flat_map(|k| waves(*k, &rows.output, &used))));
     let inside = used.iter().zip(free.freed(of(left))).filter(|(k, _)| rows.torque[**k].abs() <= friction);
     inside.map(|(_, left)| left.powi(2)).sum()
 }
