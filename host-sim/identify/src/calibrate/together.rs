@@ -110,10 +110,11 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
     })
 }
 
-/// A generator that is turned back by what its waves say has to leave less than this share of the squares, and no more
-/// than this share of the rms of each log alone: else it is not the zero alone that differs. Guesses.
+/// A generator that is turned back by what its waves say has to leave less than this share of the squares, … *Guess*.
 const TURNED_BACK: f64 = 0.8;
-const AS_ALONE: f64 = 1.1;
+/// … and, of what all logs together leave beyond each alone, no more than this share: else it is not the zero alone that
+/// differs. *Guess*.
+const BEYOND_ALONE: f64 = 0.25;
 /// Whole turns are told if without them this multiple of the squares is left, at least. *Guess*.
 const OTHER_TURN: f64 = 1.2;
 /// Logs that are turned, at most: pieces of one log with zeros of their own are many, and their generator is one.
@@ -257,10 +258,11 @@ impl LogPair<'_> {
         let Some(stands) = self.agreement(0.0) else { return same };
         let squares = |agreement: &Agreement| agreement.together_arcsec.powi(2);
         // All together never leave less than each alone, whichever way they are turned.
-        let may_gain = |share: f64| stands.alone_arcsec.powi(2) < share * squares(&stands);
-        let gains = |zero: &f64, share: f64| {
-            let turned = self.agreement(*zero).filter(|turned| squares(turned) < share * squares(&stands));
-            turned.is_some_and(|turned| turned.together_arcsec < AS_ALONE * turned.alone_arcsec)
+        let alone = stands.alone_arcsec.powi(2);
+        let may_gain = |share: f64| alone < share * squares(&stands);
+        let left = |zero: &f64| self.agreement(*zero).map_or(f64::INFINITY, |turned| squares(&turned));
+        let gains = |left: f64, share: f64| {
+            left < share * squares(&stands) && left - alone < BEYOND_ALONE * (squares(&stands) - alone)
         };
         if !may_gain(1.0 - LEAST_GAIN) {
             return same;
@@ -271,15 +273,17 @@ impl LogPair<'_> {
         }
         let step = TAU / STEPS_OF_A_TURN / FINE_STEPS;
         let by_output = -ratio * within(off, TAU);
-        let absolute = by_output.abs() > step && gains(&by_output, 1.0 - LEAST_GAIN);
-        let by_waves = || self.by_waves().filter(|zero| gains(zero, TURNED_BACK));
+        let left_by_output = left(&by_output);
+        let absolute = by_output.abs() > step && gains(left_by_output, 1.0 - LEAST_GAIN);
+        let by_waves = || self.by_waves().filter(|zero| gains(left(zero), TURNED_BACK));
         let found = match absolute {
             true => Some(by_output),
             false if may_gain(TURNED_BACK) => by_waves(),
             false => None,
         };
         let found = found.and_then(|zero| self.search(FOUND_WITH, |search| search.close_to(zero, step)));
-        let untold = elsewhere && !stands.agree();
+        // As it stands is what nobody would turn: it is told where turning it leaves more.
+        let untold = elsewhere && may_gain(TURNED_BACK) && left_by_output < squares(&stands);
         match found {
             Some(zero) if absolute => Start { zero_rad: Some(zero), output_turns: turns(off) },
             None if untold => Start { zero_rad: None, ..same },
