@@ -10,8 +10,9 @@ use flexspline::{FixedMember, Table};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::calibrate::{State, steady};
+use crate::calibrate::{GOLDEN, State, steady};
 use crate::measurement::Gear;
+use crate::residual::harmonics;
 use flexspline_base::toml_file::{Allowed, Refused, Section, TomlFile, from, number, one_of, real, whole};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
@@ -23,6 +24,10 @@ const FARTHEST_WIND_UP_RAD: f64 = 0.02;
 
 /// Places over a tooth pitch that an error of a table is averaged over. *Guess*: twice its nodes.
 const STEPS_OF_A_PITCH: u32 = 16;
+/// Places over an output turn that waves of a table are fitted to. *Guess*: dozens for each of its orders.
+const PLACES_OF_A_TURN: u32 = 4000;
+/// Waves in a turn of the generator that every strain wave gear has, and their first overtone.
+pub(crate) const OF_TWO_LOBES: [f64; 2] = [2.0, 4.0];
 
 /// Tooth counts of a strain wave drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -223,6 +228,27 @@ impl Nominal {
             spread: USUAL_SPREAD,
             kernels: None,
         }
+    }
+
+    /// That of a table whose gear is known by its ratio alone, with the waves that the two lobes of a generator make in
+    /// a turn of it.
+    pub(crate) fn of_table_by_ratio(table: &Table<'_>, ratio: f64) -> Nominal {
+        let nominal = Nominal::of_table(table);
+        let at = |psi: &f64| State {
+            generator_rad: *psi,
+            temperature_c: nominal.temperature_c,
+            way: 1.0,
+            ..State::default()
+        };
+        let angles: Vec<f64> = (0..PLACES_OF_A_TURN).map(|k| TAU * ratio * (f64::from(k) * GOLDEN).fract()).collect();
+        let errors: Vec<f64> = angles.iter().map(|psi| steady(table, &at(psi), 0.0)).collect();
+        let harmonics = harmonics(&angles, &errors, &OF_TWO_LOBES).map_or_else(Vec::new, |(_, lines)| lines);
+        let harmonics = harmonics.into_iter().map(|line| Harmonic {
+            order_per_generator_turn: line.order,
+            amplitude_arcsec: line.amplitude,
+            phase_rad: line.phase_rad,
+        });
+        Nominal { ratio, teeth: None, harmonics: harmonics.collect(), ..nominal }
     }
 
     /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit,

@@ -11,6 +11,7 @@ use serde_json::Value;
 use thiserror::Error;
 
 use crate::calibrate::{INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
+use crate::extension::{left_by_core, less, without_zero};
 use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, quantile_of, white_noise,
@@ -244,7 +245,21 @@ pub fn read(
 ) -> Result<RowsRead, MeasuredError> {
     let nominal = Nominal::of_table(table);
     let recording = parse_known(file, bytes, columns, &nominal, Some(table))?;
-    rows_of(if on_zero { on_zero_of(table, recording) } else { recording }, nominal.ratio, temperature_c)
+    let on_one = |recording| on_own_zeros(table, on_zero_of(table, recording), temperature_c);
+    rows_of(if on_zero { on_one(recording) } else { recording }, nominal.ratio, temperature_c)
+}
+
+/// A log of which sessions have zeros of their own, with what a table leaves in each about its zero.
+fn on_own_zeros(table: &Table<'_>, mut log: Recording, temperature_c: f64) -> Recording {
+    let own: Vec<bool> = log.sessions.iter().map(|session| session.own_zero).collect();
+    if own.iter().skip(1).any(|own| *own) {
+        let left: Vec<Vec<f64>> =
+            log.sessions.iter().map(|session| left_by_core(table, session, temperature_c)).collect();
+        let about_zero = without_zero(left.clone(), &vec![false; own.len()], &own);
+        let zeros = left.iter().zip(&about_zero).map(|(left, about)| vec![left[0] - about[0]; left.len()]);
+        less(&mut log.sessions, zeros.collect::<Vec<Vec<f64>>>().iter());
+    }
+    log
 }
 
 /// The rows of a recording, if a table can be played over them.

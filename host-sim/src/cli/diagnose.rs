@@ -28,8 +28,9 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// table (--tables), or of the ratio alone (--ratio) with wind-up and backlash fitted to the same rows. Where causes
 /// are found it writes drive-extended.toml, to be given again as the input was: with --model in the place of a
 /// nominal.toml, or with --drive beside --tables. Of two tables it writes the one that leaves less error in rows that
-/// took no part, if it leaves less than the nominal one and none: that of the causes as <G>-extended.fxt, that of a
-/// calibration of the same rows as calibrated.fxt, each with .json, .rs and .h.
+/// took no part, if it leaves less than none, and less than the nominal table or no more than the nominal model: that
+/// of the causes as <G>-extended.fxt, that of a calibration of the same rows as calibrated.fxt, each with .json, .rs
+/// and .h.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\

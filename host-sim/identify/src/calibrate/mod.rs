@@ -63,7 +63,7 @@ pub use torque::WindUpTorque;
 pub(crate) use zero::{Alignment, steady};
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
-const GOLDEN: f64 = 0.618_033_988_749_895;
+pub(crate) const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Fewest rows in steady motion that make a table.
 const FEWEST_ROWS: usize = 64;
 /// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load
@@ -298,14 +298,13 @@ fn collinear(rows: &Rows, model: &Model, correlation: f64) -> Vec<(PartName, f64
 
 /// Says so where the load goes with the output's angle, and the rows tell neither alone as well as both together, to
 /// `as_recorded_arcsec`.
-fn load_with_angle(correlation: f64, known: &ModelUncertainty, as_recorded_arcsec: f64) -> Option<String> {
-    let ends = known.nodes().into_iter().filter(|node| node.part == PartName::WindUp.as_str());
-    let widest = ends.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
-    (correlation > TURNS_WITH_THE_OUTPUT && widest > as_recorded_arcsec).then(|| {
+fn load_with_angle(correlation: f64, wind_up_alone_arcsec: f64, as_recorded_arcsec: f64) -> Option<String> {
+    (wind_up_alone_arcsec > as_recorded_arcsec).then(|| {
         format!(
             "the load goes with the angle of the output (correlation {correlation:.2}), as the weight of an arm does: \
-             wind-up and waves of the output are one there, the wind-up alone is known to ±{widest:.0} arcsec, and \
-             under another load at the same angles the table is as far off; record the same angles under other loads"
+             wind-up and waves of the output are one there, the wind-up alone is known to ±{wind_up_alone_arcsec:.0} \
+             arcsec, and under another load at the same angles the table, and a torque from the wind-up, are as far \
+             off; record the same angles under other loads"
         )
     })
 }
@@ -504,7 +503,7 @@ fn calibrated<T>(
     };
     let anew = set_anew(files, prior);
     said.extend(anew.iter().map(|_| SET_ANEW.to_owned()));
-    let files = anew.as_ref().map_or(files, |(pieces, _)| pieces);
+    let files = anew.as_deref().unwrap_or(files);
     let mut recorded = Recorded::of(files, prior);
     let mut rows = settled(files, prior, &recorded);
     let starts = Starts::of(&rows, &recorded, prior, files);
@@ -562,9 +561,9 @@ fn by_zeros(file: &Recording, begins: impl Fn(&Session) -> bool) -> Vec<Recordin
     pieces
 }
 
-/// Logs in pieces of a session each, with their rows, if sessions have zeros of their own: these leave far less than
+/// Logs in pieces of a session each, if sessions have zeros of their own: these leave far less than
 /// one zero for each log, whatever load and direction do in addition.
-fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<(Vec<Recording>, Rows)> {
+fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<Vec<Recording>> {
     if files.iter().all(|file| file.sessions.len() < 2) {
         return None;
     }
@@ -576,15 +575,15 @@ fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<(Vec<Recording>, R
     let rows = settled(&anew, prior, &recorded);
     let long = (0..anew.len()).all(|log| rows.rows.iter().filter(|row| row.at.log == log).count() >= FEWEST_ROWS);
     let left = |rows: &Rows| zero::left_beside_load(rows, recorded.scales.friction_n_m);
-    (long && left(&rows) < LEAVES * left(&settled(files, prior, &recorded))).then_some((anew, rows))
+    (long && left(&rows) < LEAVES * left(&settled(files, prior, &recorded))).then_some(anew)
 }
 
 /// A generator that started elsewhere is off by more than this beyond the interval, deg. *Guess*: a degree moves a
 /// table by little.
 const LEAST_START_DEG: f64 = 1.0;
 
-/// A log with each piece that has a zero of its own on the zero of a table, where its waves tell that. Whole turns
-/// stay, unless the output says them: a motor that was homed in another turn did not start anew.
+/// A log with each piece that has a zero of its own on the generator's zero of a table, where its waves tell that, and
+/// with what is known of zeros of its sessions. Whole turns stay, unless the output says them: a motor that was homed in another turn did not start anew.
 pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     let prior = Prior::of_table(table, GeneratorKind::Cam);
     let mut sessions = Vec::new();
@@ -610,12 +609,8 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         sessions.extend(piece.sessions);
     }
     log.sessions = sessions;
-    // Where sessions have zeros of their own, the output of each is put on that of the first.
-    if let Some((_, Rows { means_arcsec: means, .. })) = set_anew(std::slice::from_ref(&log), &prior) {
-        let off_arcsec = means.iter().map(|mean| mean - means[0]);
-        for (session, off_arcsec) in log.sessions.iter_mut().zip(off_arcsec) {
-            session.error_rad.iter_mut().for_each(|error| *error -= off_arcsec / ARCSEC_PER_RAD);
-        }
+    if set_anew(std::slice::from_ref(&log), &prior).is_some() {
+        log.sessions.iter_mut().for_each(|session| session.own_zero = true);
         log.notes.push(SET_ANEW.to_owned());
     }
     log
@@ -694,7 +689,11 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
-    notes.extend(load_with_angle(correlation, &known, half_width_as_recorded_arcsec));
+    let of_wind_up = known.nodes().into_iter().filter(|node| node.part == PartName::WindUp.as_str());
+    let widest = of_wind_up.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
+    let wind_up_alone_arcsec = if correlation > TURNS_WITH_THE_OUTPUT { widest } else { 0.0 };
+    notes.extend(load_with_angle(correlation, wind_up_alone_arcsec, half_width_as_recorded_arcsec));
+    let torque_from_wind_up = torque_from_wind_up.map(|of| of.known_to(wind_up_alone_arcsec));
     let offset = |(log, middle): (usize, &f64)| {
         let left: Vec<f64> = rows.rows.iter().filter(|row| row.at.log == log).map(zero).collect();
         let count = left.len().max(1) as f64;

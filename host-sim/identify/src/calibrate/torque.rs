@@ -45,7 +45,7 @@ pub struct WindUpTorque {
     /// Rows.
     pub rows: usize,
     /// Half width of the error that the intervals are of, arcsec: where 95 of 100 rows of the other folds lie, and of
-    /// all rows.
+    /// all rows; no less than the wind-up is known to where the load goes with the angle of the output.
     pub half_width_arcsec: f64,
     /// The same for who reads with the table alone, as the core does.
     #[serde(default)]
@@ -171,6 +171,13 @@ impl WindUpTorque {
         let half_width_alone_arcsec = of_all(&Hysteresis::default(), self.half_width_alone_arcsec);
         let with = self.hysteresis.as_ref().map(|hysteresis| of_all(hysteresis, self.half_width_arcsec));
         Self { half_width_arcsec: with.unwrap_or(half_width_alone_arcsec), half_width_alone_arcsec, ..self }
+    }
+
+    /// No better than a wind-up that is known to this, whatever the rows say.
+    pub(super) fn known_to(self, arcsec: f64) -> Self {
+        let [half_width_arcsec, half_width_alone_arcsec] =
+            [self.half_width_arcsec, self.half_width_alone_arcsec].map(|half| half.max(arcsec));
+        Self { half_width_arcsec, half_width_alone_arcsec, ..self }
     }
 
     /// Of fits, each without the fold of its place. Springs go by torques found, by those recorded between flanks.

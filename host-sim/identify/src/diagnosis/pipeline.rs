@@ -19,7 +19,7 @@ use thiserror::Error;
 use super::report::{Cause, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose};
 use super::{channels, torque_zero, zeros};
-use crate::calibrate::{CalibrationError, MOST_ERROR_RAD, Prior, calibrated_table, check_ratio_of};
+use crate::calibrate::{CalibrationError, LEAST_GAIN, MOST_ERROR_RAD, Prior, calibrated_table, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
     CauseEntry, Evaluation, ExtendedTables, Model, TableKind, TableSubject, causes_to_toml, evaluate, found_geometry,
@@ -126,13 +126,15 @@ pub struct Subject<'a> {
     pub drive: Drive,
     /// Its generator.
     pub kind: GeneratorKind,
+    /// What was taken for known of it, where the rows themselves say the rest.
+    note: Option<String>,
 }
 
 impl<'a> Subject<'a> {
     /// A drive known from its catalogue, or extended before.
     #[must_use]
     pub fn of_model(model: Model, drive: Drive, kind: GeneratorKind) -> Subject<'static> {
-        Subject { nominal: model.nominal.clone(), table: None, model: Some(model), drive, kind }
+        Subject { nominal: model.nominal.clone(), table: None, model: Some(model), drive, kind, note: None }
     }
 
     /// A drive known by its ratio: wind-up and backlash are those that a calibration of the same rows finds, so that no
@@ -149,8 +151,15 @@ impl<'a> Subject<'a> {
         let log = parse_known(file, bytes, columns, &prior.nominal, None)?;
         let made = calibrated_table(&[log], &prior)?;
         let table = Table::check(&made.image).map_err(PipelineError::Image)?;
-        let nominal = Nominal { ratio, teeth: None, ..Nominal::of_table(&table) };
-        Ok(Subject::of_model(Model { nominal, causes: Vec::new() }, drive, kind))
+        let nominal = Nominal::of_table_by_ratio(&table, ratio);
+        let waves = nominal.harmonics.iter().map(|of| format!("{:.1}", of.amplitude_arcsec));
+        let note = format!(
+            "the ratio alone was given: 2 and 4 waves in a turn of the generator, of {} arcsec, count as the gear's \
+             own, which every strain wave gear has; an encoder of the generator that is tilted makes the same",
+            waves.collect::<Vec<String>>().join(" and ")
+        );
+        let subject = Subject::of_model(Model { nominal, causes: Vec::new() }, drive, kind);
+        Ok(Subject { note: Some(note), ..subject })
     }
 
     /// A drive with its table.
@@ -164,7 +173,7 @@ impl<'a> Subject<'a> {
             let (of, given) = (hex(table.drive_hash()), hex(drive.hash()));
             return Err(PipelineError::OtherDrive { of, drive: drive.name, given });
         }
-        Ok(Subject { nominal: Nominal::of_table(&table), table: Some(table), model: None, drive, kind })
+        Ok(Subject { nominal: Nominal::of_table(&table), table: Some(table), model: None, drive, kind, note: None })
     }
 
     /// With the influence kernels of the drive.
@@ -291,6 +300,7 @@ pub fn parse_rows(
     subject: &Subject<'_>,
 ) -> Result<Recording, PipelineError> {
     let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
+    recording.notes.extend(subject.note.clone());
     // Teeth that skip look like another ratio.
     if recording.tooth_steps.is_empty() {
         let said = check_ratio_of(&recording, subject.nominal.ratio, MOST_ERROR_RAD)?;
@@ -303,7 +313,8 @@ pub fn parse_rows(
     if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
         recording.unusable = without_torque(&recording);
     }
-    if recording.unusable.is_none() {
+    // The zero is where the output changes its flank, if it is known how friction shifts that.
+    if recording.unusable.is_none() && (table.is_some() || nominal.friction_torque_n_m > 0.0) {
         torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
     }
     recording.average_to(MOST_ROWS);
@@ -472,7 +483,13 @@ impl Diagnosed {
         let mut extension = Extension { compensation: Some(evaluation.clone()), ..Extension::default() };
         let table_subject = subject.table_subject();
         let tables = tables_of(subject, &table_subject, std::slice::from_ref(&self.recording));
-        let gain = evaluation.tables_that_gain(subject.table.is_some());
+        // A model is no table yet; one that was fitted to these rows is no measure of one that has not seen all of them.
+        let most_of_nominal = match (&subject.table, &subject.note) {
+            (Some(_), _) => 1.0 - LEAST_GAIN,
+            (None, None) => 1.0 / (1.0 - LEAST_GAIN),
+            (None, Some(_)) => f64::INFINITY,
+        };
+        let gain = evaluation.tables_that_gain(most_of_nominal);
         let mut drive_toml = None;
         if let Some(known) = subject.model.as_ref().filter(|_| !self.diagnosis.causes.is_empty()) {
             let mut model = Model::of_diagnosis(&subject.nominal, &self.diagnosis, &self.extended);
@@ -602,7 +619,7 @@ mod tests {
         assert!(!notes.iter().any(|note| note.contains("judge by")), "{notes:?}");
     }
 
-    /// A ratio alone: wind-up and play are those of the rows, and the wave that is left has its order.
+    /// A ratio alone: wind-up, play and the waves of two lobes are those of the rows.
     #[test]
     fn a_ratio_alone_takes_the_spring_from_the_rows() {
         let nominal = catalogue_drive();
@@ -621,8 +638,9 @@ mod tests {
         assert!((found / true_one - 1.0).abs() < 0.05, "{found} for {true_one}");
         let rows = parse_rows("gear.csv", text.as_bytes(), &columns, &subject).unwrap();
         let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
-        let said = done.diagnosis.text();
-        assert!(said.contains("generator_encoder_tilt (50 %)") && said.contains("the gear's own wheels"), "{said}");
+        assert_eq!(done.diagnosis.causes, [], "{}", done.diagnosis.text());
+        let note = "2 and 4 waves in a turn of the generator, of 30.0 and 0.0 arcsec, count as the gear's own";
+        assert!(done.recording.notes.iter().any(|of| of.contains(note)), "{:?}", done.recording.notes);
         let other = Subject::of_ratio(1.0, (Drive::hhd_95(), GeneratorKind::Cam), ("g.csv", Vec::new(), &columns));
         assert!(other.err().unwrap().to_string().starts_with("--ratio: found 1, allowed: 2 to 10000"));
     }

@@ -17,8 +17,8 @@ use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
 use super::{Search, Settings, experiment, held_out, remainder, rivals, with_speed};
-use crate::causes::{CauseName, ParameterName};
-use crate::nominal::Nominal;
+use crate::causes::{CauseName, Kin, ParameterName};
+use crate::nominal::{Nominal, OF_TWO_LOBES};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// The verdict over what a `search` has selected, with its causes and what is left over. Rivals are looked at on a
@@ -91,6 +91,7 @@ pub(super) fn conclude(
     for k in &named {
         trace.decided(Stage::Verdict, selected.terms[*k].law.label, None, vec![no_worse]);
     }
+    let all_is_told = verdict == Verdict::Explained && is_explained(problem, rms_after, floor, held.total);
     let (mut causes, mut effects) = (Vec::new(), Vec::new());
     let mut next_experiment = None;
     if verdict != Verdict::Unknown {
@@ -118,7 +119,7 @@ pub(super) fn conclude(
                         format!("{text}; expected to tell them apart by {apart:.0} standard deviations")
                     });
             }
-            let look_alike_outside = outside(k, name, &known[k], selected, problem);
+            let look_alike_outside = outside(k, name, &known[k], selected, problem, all_is_told);
             let shares = shares(name, &misfits, look_alike_outside.is_some(), closest, known[k].size_told);
             causes.push(Cause {
                 name,
@@ -144,7 +145,7 @@ pub(super) fn conclude(
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
-        Verdict::Explained if !is_explained(problem, rms_after, floor, held.total) => Verdict::PartlyExplained,
+        Verdict::Explained if !all_is_told => Verdict::PartlyExplained,
         other => other,
     };
     let once_in_a_turn = |cause: &Cause| {
@@ -382,8 +383,11 @@ fn outside(
     known: &Known,
     selected: &Selected<'_>,
     problem: &Problem<'_>,
+    all_is_told: bool,
 ) -> Option<&'static str> {
     let nominal = problem.on.nominal;
+    let law = selected.terms[k].law;
+    let of_load = matches!(law.wrong.kin, Kin::Torque | Kin::Friction | Kin::Drag | Kin::Clearance | Kin::Motion);
     let standing = standing_pitch_error(nominal);
     let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
     let is_subdivision = name == CauseName::EncoderSubdivision && at_output;
@@ -391,13 +395,28 @@ fn outside(
     let not_held_against_it = nominal.teeth.is_none()
         || name == CauseName::EncoderSubdivision
         || but(&selected.terms, k).any(|other| other.law.is(standing));
-    let line_of_generator = waves_per_generator_turn(name, known, nominal).is_some();
+    let waves = waves_per_generator_turn(name, known, nominal);
+    let line_of_generator = waves.is_some();
+    let stated = |order: &f64| nominal.harmonics.iter().any(|of| of.order_per_generator_turn == *order);
+    let harmonic = known.parameters.get(ParameterName::Harmonic.as_str()).map(|harmonic| harmonic.value);
+    let order = waves.or(harmonic.filter(|_| name == standing));
+    let of_two_lobes = order.is_some_and(|order| OF_TWO_LOBES.contains(&order) && !stated(&order));
     let reasons = [
         (load_makes_it(Some(name), problem), "a load that was not recorded"),
+        (
+            law.wrong.kin == Kin::Clearance && nominal.teeth.is_none() && nominal.friction_torque_n_m == 0.0,
+            "friction of the output, which was not given",
+        ),
+        // While something is left, what the model takes for known of the load and the play may be wrong as well.
+        (
+            !all_is_told && (of_load || law.acts.meets_zones || law.acts.zones.is_some()),
+            "drag, stiffness or play other than the model says",
+        ),
         (name.spec().double_outside, "a shaft before the encoder that is bent or not aligned"),
         (part_of_a_turn, "a wheel before the encoder, which repeats within this part of a turn"),
+        (of_two_lobes, "the waves of any strain wave gear, which the model does not state"),
         (
-            line_of_generator && nominal.teeth.is_none(),
+            (line_of_generator || name == CauseName::GeneratorEncoderEccentricity) && nominal.teeth.is_none(),
             "the gear's own wheels, of which the teeth are not known, or the torque of the motor",
         ),
         (line_of_generator && (name == standing || not_held_against_it), "the torque of the motor"),

@@ -13,7 +13,7 @@ use super::sampled::ExtendedTables;
 use crate::calibrate::{LEAST_GAIN, Prior, calibrated_table};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::diagnosis::{Compensation, Extended, Series};
-use crate::measurement::{Recording, Session, rms};
+use crate::measurement::{Recording, Session, least_and_most, rms};
 use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -61,16 +61,14 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// Tables that leave less than none and than the nominal one, or no more than a nominal model that is no table yet;
-    /// the best first, with what they leave, arcsec rms. That of the causes comes first unless the calibrated one is
-    /// better by what counts as a gain: it holds beyond the rows.
+    /// Tables that leave less than none, and less than this share of the squares that the nominal one leaves; the best
+    /// first, with what they leave, arcsec rms. That of the causes comes first unless the calibrated one is better by
+    /// what counts as a gain: it holds beyond the rows.
     #[must_use]
-    pub(crate) fn tables_that_gain(&self, nominal_is_a_table: bool) -> Vec<(TableKind, f64)> {
+    pub(crate) fn tables_that_gain(&self, most_of_nominal: f64) -> Vec<(TableKind, f64)> {
         let less = |left: f64, than: f64| left * left < (1.0 - LEAST_GAIN) * than * than;
         let (none, nominal) = (self.left.rms_uncompensated_arcsec, self.left.rms_nominal_tables_arcsec);
-        let gains = |left: &f64| {
-            less(*left, none) && if nominal_is_a_table { less(*left, nominal) } else { !less(nominal, *left) }
-        };
+        let gains = |left: &f64| less(*left, none) && left * left < most_of_nominal * nominal * nominal;
         let extended = Some(self.left.rms_extended_tables_arcsec).filter(gains).filter(|_| !self.applied.is_empty());
         let calibrated = self.left.rms_calibrated_table_arcsec.filter(gains);
         let swapped = extended.zip(calibrated).is_some_and(|(extended, calibrated)| less(calibrated, extended));
@@ -200,9 +198,10 @@ pub fn evaluate(
         }
     };
     let own: Vec<bool> = sessions.iter().map(|session| session.own_zero).collect();
+    let counts = within_loads(&sessions, &used);
     let held = |left: Vec<Vec<f64>>| {
-        let held = without_zero(left, &used, &own).into_iter().zip(&used).filter(|(_, used)| !**used);
-        rms(&held.flat_map(|(left, _)| left).collect::<Vec<f64>>())
+        let rows = without_zero(left, &used, &own).into_iter().flatten().zip(&counts);
+        rms(&rows.filter(|(_, counts)| **counts).map(|(left, _)| left).collect::<Vec<f64>>())
     };
     let by_extended = by_extended.unwrap_or_else(|| by_nominal.clone());
     evaluation.left = Compensation {
@@ -214,6 +213,18 @@ pub fn evaluate(
     evaluation
 }
 
+/// Which rows of all sessions are held out under a load between those learnt from, where any is: no table holds more.
+fn within_loads(sessions: &[Session], used: &[bool]) -> Vec<bool> {
+    let loads =
+        || sessions.iter().zip(used).map(|(session, used)| (session.states(0.0).map(|[_, load, _]| load), *used));
+    let (low, high) = least_and_most(loads().filter(|(_, used)| *used).flat_map(|(loads, _)| loads));
+    let held = |by: fn(f64, f64, f64) -> bool| -> Vec<bool> {
+        loads().flat_map(|(loads, used)| loads.map(move |load| !used && by(low, load, high))).collect()
+    };
+    let within = held(|low, load, high| (low..=high).contains(&load));
+    if within.contains(&true) { within } else { held(|_, _, _| true) }
+}
+
 /// Takes what something adds off the error of each session, arcsec.
 pub(crate) fn less<'a>(sessions: &mut [Session], added_arcsec: impl Iterator<Item = &'a Vec<f64>>) {
     for (session, added) in sessions.iter_mut().zip(added_arcsec) {
@@ -223,7 +234,7 @@ pub(crate) fn less<'a>(sessions: &mut [Session], added_arcsec: impl Iterator<Ite
 
 /// Takes the zero away: of sessions that share one, from each that has its `own` on, the mean over those learnt from,
 /// or over all of them where nothing was learnt from any.
-fn without_zero(mut left: Vec<Vec<f64>>, used: &[bool], own: &[bool]) -> Vec<Vec<f64>> {
+pub(crate) fn without_zero(mut left: Vec<Vec<f64>>, used: &[bool], own: &[bool]) -> Vec<Vec<f64>> {
     let starts = (0..left.len()).filter(|k| *k == 0 || own[*k]).chain([left.len()]).collect::<Vec<usize>>();
     for sharing in starts.windows(2).map(|at| at[0]..at[1]) {
         let learns = used[sharing.clone()].contains(&true);
@@ -283,7 +294,7 @@ mod tests {
             };
             let evaluation = Evaluation { left, applied: applied.to_vec(), ..Evaluation::default() };
             let gain = |nominal| evaluation.tables_that_gain(nominal).into_iter().map(|(kind, _)| kind).collect();
-            [true, false].map(|nominal| -> Vec<TableKind> { gain(nominal) })
+            [1.0 - LEAST_GAIN, 1.0 / (1.0 - LEAST_GAIN)].map(|nominal| -> Vec<TableKind> { gain(nominal) })
         };
         let both = |kinds: &[TableKind]| [kinds.to_vec(), kinds.to_vec()];
         let cause = [CauseName::BacklashGrowth];

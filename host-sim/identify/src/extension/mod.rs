@@ -12,8 +12,8 @@ mod geometry;
 mod model;
 mod sampled;
 
-pub(crate) use compensation::less;
 pub use compensation::{Evaluation, NotApplied, TableKind, evaluate, left_by_core, split};
+pub(crate) use compensation::{less, without_zero};
 pub(crate) use geometry::{Placing, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
 pub(crate) use sampled::{ExtendedTables, TableSubject};
