@@ -528,6 +528,9 @@ export async function driveBench(view, asked, bench) {
       ...FIGURES.slice(0, 7).flatMap(([words, of]) => [el("dt", { text: words }), el("dd", {}, of(one))]),
     );
     const lines = shown.filter(({ of }) => of.rows);
+    const first = [...found.values()].find((of) => of.job);
+    // Pictures of another drive beside a failure would be taken for those of this one.
+    [chart.figure.hidden, stress.figure.hidden] = [!lines.length, !first];
     if (lines.length) {
       // Over the pitch as the report has it: from where a generator at angle 0 stands.
       const curve = ({ of }) => {
@@ -554,7 +557,6 @@ export async function driveBench(view, asked, bench) {
         [xs, ...columns],
       );
     }
-    const first = [...found.values()].find((of) => of.job);
     if (first && seenStress !== first.job.out) {
       seenStress = first.job.out;
       await stress.of(await readReport(`${first.job.out}/report.html`));
