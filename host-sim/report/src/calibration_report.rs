@@ -42,15 +42,18 @@ pub fn page(made: &Calibrated) -> Page {
 fn headline(c: &Calibration) -> Headline {
     let kept = c.parts.iter().filter(|part| part.kept).count();
     let words = format!(
-        "With the table of this unit the residual is {{}} rms of {{}} over all rows{}; it adds {kept} part{} to the \
-         prior model.",
+        "With the table of this unit the held-out error is {{}} rms of {{}}{}, and {{}} over all rows in the core; it \
+         adds {kept} part{} to the prior model.",
         if c.has_delay() { ", the delay between the readings taken out" } else { "" },
         if kept == 1 { "" } else { "s" }
     );
     Headline::new(
-        RichText::filled(&words, &[(c.core.rms_after_arcsec, 3), (c.core.rms_before_arcsec, 3)]),
-        RichText::arcsec(c.core.rms_after_arcsec, 3),
-        "residual with the table, rms over all rows".to_owned(),
+        RichText::filled(
+            &words,
+            &[c.held_out.rms_after_arcsec, c.held_out.rms_before_arcsec, c.core.rms_after_arcsec].map(|rms| (rms, 3)),
+        ),
+        RichText::arcsec(c.held_out.rms_after_arcsec, 3),
+        "held-out error with the table, rms".to_owned(),
     )
 }
 

@@ -371,15 +371,15 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
     let removed = 100.0 * (1.0 - core.rms_after_arcsec / core.rms_before_arcsec);
     let _ = writeln!(
         text,
-        "all rows, reversals included, arcsec rms: {:.2} {as_measured}, {:.2} with table {} in the core ({removed:.1} \
-         % less)",
-        core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
-    );
-    let _ = writeln!(
-        text,
         "held-out error in steady motion, arcsec rms: {:.2} {as_measured}, {:.2} with the prior model, {:.2} with the \
          table",
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
+    );
+    let _ = writeln!(
+        text,
+        "all rows, reversals included, arcsec rms: {:.2} {as_measured}, {:.2} with table {} in the core ({removed:.1} \
+         % less)",
+        core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
     );
     let _ = writeln!(text, "{}", held(c));
     if let Some(torque) = &c.torque_from_wind_up {

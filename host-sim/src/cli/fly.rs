@@ -23,7 +23,8 @@ use flexspline_report::flight_report;
 /// With --tables FILE.fxt the drive of that table flies in the place of HHD-95: built with the same errors, and the
 /// core has the file itself where the scenario's table is "nominal".
 ///
-/// A servo that is not stable is a result, and no failed run: exit code 0, `stable` is false.
+/// A servo that is not stable is a result, and no failed run: exit code 0, `stable` is false. One under which the joint
+/// runs away is a failed run.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
