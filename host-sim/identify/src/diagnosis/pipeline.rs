@@ -22,8 +22,7 @@ use super::{channels, torque_zero, zeros};
 use crate::calibrate::{CalibrationError, LEAST_GAIN, MOST_ERROR_RAD, Prior, calibrated_table, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
-    CauseEntry, Evaluation, ExtendedTables, Model, TableKind, TableSubject, causes_to_toml, evaluate, found_geometry,
-    less,
+    CauseEntry, Evaluation, ExtendedTables, Model, TableKind, causes_to_toml, evaluate, found_geometry, less,
 };
 use crate::known_rows::parse_known;
 use crate::measurement::{
@@ -35,6 +34,8 @@ use flexspline_design::kernels::Kernels;
 use flexspline_design::tables::{MadeTable, TableError, c_header, rust_source};
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
 
+/// A drive that is known from its catalogue, as tables name it.
+const CATALOGUE_DRIVE: &str = "catalogue drive";
 /// Rows that are diagnosed at most. *Chosen* for the memory that they take, 1.5 GB.
 const MOST_ROWS: usize = 1_000_000;
 
@@ -190,20 +191,10 @@ impl<'a> Subject<'a> {
         Ok(self)
     }
 
-    /// What a table of the extended drive is made for: name of the drive, and hash of what made the nominal model.
-    fn table_subject(&self) -> TableSubject {
+    /// BLAKE3 of what made the nominal model: the drive, or the model itself.
+    fn hash(&self) -> [u8; 32] {
         let model = || self.model.as_ref().map_or_else(String::new, Model::to_toml);
-        let hash = if self.table.is_some() { self.drive.hash() } else { *blake3::hash(model().as_bytes()).as_bytes() };
-        let name = if self.table.is_some() { self.drive.name.as_str() } else { "catalogue drive" };
-        TableSubject { kind: self.kind, drive: format!("{name}-extended"), hash }
-    }
-
-    /// Takes what the model says of causes known before from the errors.
-    fn take_away_known(&self, recording: &mut Recording) -> Result<(), PipelineError> {
-        let Some((names, added)) = self.known_arcsec(recording, |_| true)? else { return Ok(()) };
-        less(&mut recording.sessions, added.iter());
-        recording.notes.push(format!("the model holds {names} already; what is found is beyond that"));
-        Ok(())
+        if self.table.is_some() { self.drive.hash() } else { *blake3::hash(model().as_bytes()).as_bytes() }
     }
 
     /// The model, if it holds causes that were found before.
@@ -256,16 +247,15 @@ impl<'a> Subject<'a> {
     /// # Errors
     /// It makes no table.
     fn known_table(&self, files: &[Recording]) -> Result<Option<MadeTable>, PipelineError> {
-        let made = |_| tables_of(self, &self.table_subject(), files).nominal(None);
+        let made = |_| tables_of(self, files).nominal(None);
         self.extended().map(made).transpose()
     }
 
     /// What a calibration of the same rows begins with: the table given, that of causes known before, or the model.
     fn prior<'t>(&'t self, known: Option<&'t Table<'t>>) -> Prior<'t> {
-        let TableSubject { hash, .. } = self.table_subject();
         match known.or(self.table.as_ref()) {
             Some(table) => Prior::of_table(table, self.kind),
-            None => Prior { hash, ..Prior::of_nominal(self.nominal.clone(), "catalogue drive", self.kind) },
+            None => Prior { hash: self.hash(), ..Prior::of_nominal(self.nominal.clone(), CATALOGUE_DRIVE, self.kind) },
         }
     }
 
@@ -306,7 +296,10 @@ pub fn parse_rows(
         let said = check_ratio_of(&recording, subject.nominal.ratio, MOST_ERROR_RAD)?;
         recording.notes.extend(said);
     }
-    subject.take_away_known(&mut recording)?;
+    if let Some((names, added)) = subject.known_arcsec(&recording, |_| true)? {
+        less(&mut recording.sessions, added.iter());
+        recording.notes.push(format!("the model holds {names} already; what is found is beyond that"));
+    }
     let (nominal, table) = subject.against();
     channels::check_degrees(&recording, columns, nominal, table)?;
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
@@ -356,7 +349,6 @@ pub fn diagnose_rows(
         diagnosis.say_nothing_of_the_unit(IS_IT_THIS_DRIVE);
     }
     progress(4, 5, "compensation by the core");
-    let table_subject = subject.table_subject();
     let measured = subject.as_measured(&recording)?;
     // A model whose causes make no table predicts all the same.
     let known_table = subject.known_table(std::slice::from_ref(&recording)).unwrap_or_else(|error| {
@@ -364,7 +356,7 @@ pub fn diagnose_rows(
         None
     });
     let known = known_table.as_ref().map(|made| Table::check(&made.image)).transpose().map_err(PipelineError::Image)?;
-    let tables = tables_of(subject, &table_subject, std::slice::from_ref(&recording));
+    let tables = tables_of(subject, std::slice::from_ref(&recording));
     let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
     let rows = [&recording, measured.as_ref().unwrap_or(&recording)];
     let (found, prior) = ((&extended, causes.as_slice()), subject.prior(known.as_ref()));
@@ -481,8 +473,7 @@ impl Diagnosed {
     pub fn extend(&self, subject: &Subject<'_>) -> Result<Made, PipelineError> {
         let evaluation = &self.evaluation;
         let mut extension = Extension { compensation: Some(evaluation.clone()), ..Extension::default() };
-        let table_subject = subject.table_subject();
-        let tables = tables_of(subject, &table_subject, std::slice::from_ref(&self.recording));
+        let tables = tables_of(subject, std::slice::from_ref(&self.recording));
         // A model is no table yet; one that was fitted to these rows is no measure of one that has not seen all of them.
         let most_of_nominal = match (&subject.table, &subject.note) {
             (Some(_), _) => 1.0 - LEAST_GAIN,
@@ -556,7 +547,7 @@ impl Diagnosed {
 
 /// Tables of the extended model over what the rows hold: their largest torque, their temperatures, the angle against
 /// gravity if it stays.
-fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, files: &[Recording]) -> ExtendedTables<'a> {
+fn tables_of<'a>(subject: &'a Subject<'_>, files: &[Recording]) -> ExtendedTables<'a> {
     let all = |column: fn(&Session) -> Option<&Vec<f64>>| {
         let values = files.iter().flat_map(|file| &file.sessions).filter_map(column).flatten().copied();
         let (low, high) = least_and_most(values);
@@ -565,11 +556,14 @@ fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, files: &[Record
     let torque = all(|s| s.torque_n_m.as_ref()).unwrap_or([0.0; 2]);
     let temperature = all(|s| s.temperature_c.as_ref()).unwrap_or([subject.nominal.temperature_c; 2]);
     let orientation = all(|s| s.orientation_rad.as_ref());
+    let name = if subject.table.is_some() { subject.drive.name.as_str() } else { CATALOGUE_DRIVE };
     ExtendedTables {
         nominal: &subject.nominal,
         table: subject.table.as_ref(),
         known: subject.extended().map(|model| (model, Sizes::of(&subject.drive))),
-        subject: of,
+        kind: subject.kind,
+        drive: format!("{name}-extended"),
+        hash: subject.hash(),
         torque_n_m: torque[0].abs().max(torque[1].abs()),
         temperatures_c: temperature,
         orientation_rad: orientation.filter(|[low, high]| high - low <= 1e-3).map(|[low, _]| low),

@@ -16,4 +16,4 @@ pub use compensation::{Evaluation, NotApplied, TableKind, evaluate, left_by_core
 pub(crate) use compensation::{less, without_zero};
 pub(crate) use geometry::{Placing, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
-pub(crate) use sampled::{ExtendedTables, TableSubject};
+pub(crate) use sampled::ExtendedTables;

@@ -63,19 +63,7 @@ fn positions(ratio: f64, teeth: f64) -> usize {
     places_that_tell_apart(&orders, [LEAST_POSITIONS, MOST_POSITIONS], APART)
 }
 
-/// The target of a table.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TableSubject {
-    /// Generator that names the file.
-    pub kind: GeneratorKind,
-    /// Name of the drive.
-    pub drive: String,
-    /// BLAKE3 of the drive, or of the nominal model.
-    pub hash: [u8; 32],
-}
-
 /// The inputs of tables of an extended model.
-#[derive(Clone, Copy)]
 pub struct ExtendedTables<'a> {
     /// The nominal model.
     pub nominal: &'a Nominal,
@@ -83,8 +71,12 @@ pub struct ExtendedTables<'a> {
     pub table: Option<&'a Table<'a>>,
     /// The model whose causes were known before, if there are any.
     pub known: Option<(&'a Model, Sizes)>,
-    /// The target of the table.
-    pub subject: &'a TableSubject,
+    /// Generator that names the file.
+    pub kind: GeneratorKind,
+    /// Name of the drive.
+    pub drive: String,
+    /// BLAKE3 of the drive, or of the nominal model.
+    pub hash: [u8; 32],
     /// Torque, N·m, and temperatures, °C, of the data, where no table gives the axes.
     pub torque_n_m: f64,
     /// Least and largest.
@@ -184,7 +176,7 @@ impl ExtendedTables<'_> {
             negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
             deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         };
-        Ok(from_plan(&self.subject.drive, self.subject.hash, self.subject.kind, &plan, &samples, of)?)
+        Ok(from_plan(&self.drive, self.hash, self.kind, &plan, &samples, of)?)
     }
 
     /// Steady motion both ways through a whole turn of the output at every node.
