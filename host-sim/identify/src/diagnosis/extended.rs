@@ -3,17 +3,18 @@
 //!
 //! [`Extended::fit_to`] learns from some of the sessions alone, so that what it says of the others was not seen by it.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use flexspline::Table;
 use serde::{Deserialize, Serialize};
 
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Excitation, Law, LawUnits, Tag, together};
+use super::candidate::{Acting, Excitation, Law, LawUnits, Tag, added};
 use super::model::{Problem, Scaffold, Term, among_each_other};
 use super::prepare::Jump;
 use super::report::Parameter;
-use super::rows::{Rows, add_scaled, combined};
+use super::rows::{Rows, add_scaled};
 use super::select::{Selected, less, settle_each};
 use super::{DiagnosisError, Fineness, prepare, uncertainty};
 use crate::causes::{CauseName, ParameterName};
@@ -23,11 +24,7 @@ use crate::nominal::Nominal;
 /// A cause as it was found.
 pub struct FittedCause {
     name: CauseName,
-    law: Law,
-    places: Vec<f64>,
-    /// What the columns are, and their coefficients.
-    roles: Vec<Tag>,
-    coefficients: Vec<f64>,
+    acting: Acting<'static>,
     /// Parameters with their uncertainty, as in [`super::report::Cause`].
     pub parameters: BTreeMap<&'static str, Parameter>,
 }
@@ -78,7 +75,7 @@ pub struct FittedLaw {
 #[must_use]
 pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nominal: &Nominal) -> Option<Vec<Vec<f64>>> {
     let rows = Rows::new(sessions, nominal);
-    let mut added = vec![0.0; rows.len()];
+    let mut sum = vec![0.0; rows.len()];
     let of_one_fit = |(_, a): &(CauseName, &FittedLaw), (_, b): &(CauseName, &FittedLaw)| {
         let nominal = |fit: &FittedLaw| (fit.play, fit.stiffness_n_m_per_rad, fit.backlash_arcsec);
         a.scales == b.scales && a.jumps == b.jumps && nominal(a) == nominal(b)
@@ -92,11 +89,9 @@ pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nomina
         let on = Excitation::new(&rows, &nominal, &base, &scales);
         let laws: Vec<Law> = causes.iter().flat_map(|(name, _)| (name.spec().laws)(&on)).collect();
         let acting = causes.iter().map(|(name, fit)| fit.acting(*name, &on, &laws)).collect::<Option<Vec<_>>>()?;
-        for (cause, columns) in acting.iter().zip(together(&on, &acting)) {
-            columns.iter().zip(&cause.coefficients).for_each(|(of, c)| add_scaled(&mut added, &of.values, *c));
-        }
+        added(&on, &acting).iter().for_each(|part| add_scaled(&mut sum, part, 1.0));
     }
-    Some(rows.sessions.iter().map(|session| added[session.clone()].to_vec()).collect())
+    Some(rows.sessions.iter().map(|session| sum[session.clone()].to_vec()).collect())
 }
 
 /// What a nominal model, or a table in its place, predicts for each session, arcsec, with the play as it was `found`.
@@ -128,7 +123,7 @@ impl FittedLaw {
         }
         let roles: Vec<Tag> = law.columns(on, &self.shape).iter().map(|column| column.role).collect();
         (roles.len() == self.coefficients.len()).then(|| Acting {
-            law,
+            law: Cow::Borrowed(law),
             values: self.shape.clone(),
             roles,
             coefficients: self.coefficients.clone(),
@@ -192,7 +187,8 @@ impl Extended {
         let base = Base::with_play(&rows, nominal, table, self.play);
         let on = Excitation::new(&rows, nominal, &base, &self.scales);
         let problem = Problem::new(on, &prepare::uncertain(&on, &[], &[]), self.fineness);
-        let terms = self.causes.iter().map(|cause| Term::new(&problem, &cause.law, cause.places.clone())).collect();
+        let acting = self.causes.iter().map(|cause| &cause.acting);
+        let terms = acting.map(|of| Term::new(&problem, &of.law, of.law.places(&of.values))).collect();
         let settled = Selected::of(&problem, among_each_other(&problem, terms))
             .and_then(|selected| settle_each(&problem, selected, false))
             .ok_or(DiagnosisError::NotFinite)?;
@@ -205,9 +201,9 @@ impl Extended {
         let known = uncertainty::known(problem, selected, 1.0);
         let cause = |(k, known): (usize, uncertainty::Known)| {
             let term = &selected.terms[k];
-            let Acting { roles, coefficients, .. } = term.acting(selected.fit.of(k));
-            let (law, name, parameters) = (term.law.clone(), term.law.cause()?, known.parameters);
-            Some(FittedCause { name, law, places: term.places.clone(), roles, coefficients, parameters })
+            let Acting { values, roles, coefficients, .. } = term.acting(selected.fit.of(k));
+            let acting = Acting { law: Cow::Owned(term.law.clone()), values, roles, coefficients };
+            Some(FittedCause { name: term.law.cause()?, acting, parameters: known.parameters })
         };
         let floating = problem.on.base.floating.iter().map(|floating| floating.name.clone());
         Some(Extended {
@@ -231,12 +227,12 @@ impl Extended {
     /// parameters.
     #[must_use]
     pub(crate) fn fitted_law(&self, name: CauseName, nominal: &Nominal, of: String) -> Option<FittedLaw> {
-        let cause = self.causes.iter().find(|cause| cause.name == name)?;
+        let cause = &self.causes.iter().find(|cause| cause.name == name)?.acting;
         let jump = |Jump { time_s: [begin, half, over], height_arcsec }: &Jump| [*begin, *half, *over, *height_arcsec];
         Some(FittedLaw {
             of,
             variant: cause.law.variant.to_string(),
-            shape: cause.law.values(&cause.places),
+            shape: cause.values.clone(),
             coefficients: cause.coefficients.clone(),
             jumps: self.scales.jumps.iter().map(jump).collect(),
             scales: LawUnits { jumps: Vec::new(), ..self.scales.clone() },
@@ -282,23 +278,9 @@ impl Extended {
             add_scaled(&mut recalibrated, &floating.values, *alone);
             add_scaled(&mut extended, &floating.values, *beside);
         }
-        let mut parts = Vec::new();
-        let causes: Vec<Acting<'_>> = self
-            .causes
-            .iter()
-            .map(|c| Acting {
-                law: &c.law,
-                values: c.law.values(&c.places),
-                roles: c.roles.clone(),
-                coefficients: c.coefficients.clone(),
-            })
-            .collect();
-        for (cause, columns) in self.causes.iter().zip(together(on, &causes)) {
-            let columns = columns.iter().map(|column| column.values.as_slice());
-            let part = combined(on.rows.len(), columns, &cause.coefficients);
-            add_scaled(&mut extended, &part, 1.0);
-            parts.push(part);
-        }
+        let causes: Vec<Acting<'_>> = self.causes.iter().map(|cause| cause.acting.clone()).collect();
+        let parts = added(on, &causes);
+        parts.iter().for_each(|part| add_scaled(&mut extended, part, 1.0));
         (recalibrated, extended, parts)
     }
 }

@@ -4,6 +4,7 @@
 //! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first.
 //! Nuisance columns get a prior in proportion to what the main columns of their law explain, found by iteration.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -232,7 +233,7 @@ impl<'l> Term<'l> {
     /// As a cause that acts on others.
     pub(super) fn acting(&self, coefficients: &[f64]) -> Acting<'l> {
         Acting {
-            law: self.law,
+            law: Cow::Borrowed(self.law),
             values: self.values(),
             roles: self.white.roles.clone(),
             coefficients: coefficients.to_vec(),

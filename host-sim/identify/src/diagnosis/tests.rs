@@ -2,6 +2,7 @@
 
 use super::report::{Diagnosis, Verdict};
 use super::{DiagnosisError, Settings, diagnose};
+use std::borrow::Cow;
 use std::f64::consts::FRAC_PI_2;
 
 use crate::causes::{CauseName, Kind, ParameterName};
@@ -1123,7 +1124,7 @@ fn two_displacements_together_are_the_same_in_either_order_and_not_the_sum_of_bo
     use super::candidate::{Acting, Tag, together};
     excited(|on, laws| {
         let acting = |cause: CauseName, phase: f64, size: f64| {
-            let law = law(laws, cause);
+            let law = Cow::Borrowed(law(laws, cause));
             let values = vec![phase, size, 50.0, 10.0];
             Acting { law, values, roles: vec![Tag::SIZE], coefficients: vec![1.0] }
         };
@@ -1151,13 +1152,13 @@ fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
     use super::candidate::{Acting, Tag, together};
     excited(|on, laws| {
         let gravity = || Acting {
-            law: law(laws, CauseName::GravityTorque),
+            law: Cow::Borrowed(law(laws, CauseName::GravityTorque)),
             values: vec![15.0, 0.7],
             roles: vec![Tag::SIZE],
             coefficients: vec![1.0],
         };
         let slipping = || Acting {
-            law: law(laws, CauseName::TorsionalHysteresis),
+            law: Cow::Borrowed(law(laws, CauseName::TorsionalHysteresis)),
             values: vec![10.0],
             roles: vec![Tag::SIZE],
             coefficients: vec![20.0],

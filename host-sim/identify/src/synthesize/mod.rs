@@ -25,8 +25,8 @@ use catalogue::Setting;
 
 use crate::causes::CauseName;
 use crate::diagnosis::base::{Base, PlayLaw};
-use crate::diagnosis::candidate::{Excitation, LawUnits, Simulated, added};
-use crate::diagnosis::rows::Rows;
+use crate::diagnosis::candidate::{Acting, Excitation, LawUnits, Simulated, added};
+use crate::diagnosis::rows::{Rows, add_scaled};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use flexspline_base::units::{ARCSEC_PER_RAD, ARCSEC_PER_TURN};
@@ -156,7 +156,11 @@ fn added_by(effects: &[Effect], rows: &Rows, drive: &Nominal, base: &Base, sizes
     let on = Excitation::new(rows, drive, base, &scales);
     let causes = effects.iter().filter_map(|effect| Some((effect, effect.definition.what.cause()?)));
     let simulated = |(effect, cause): (&Effect, CauseName)| (cause.spec().simulated)(&on, &|name| effect.value(name));
-    added(&on, &causes.map(simulated).collect::<Vec<Simulated>>())
+    let causes: Vec<Simulated> = causes.map(simulated).collect();
+    let acting: Vec<Acting<'_>> = causes.iter().map(|cause| cause.acting(&on)).collect();
+    let mut sum = vec![0.0; rows.len()];
+    added(&on, &acting).iter().for_each(|part| add_scaled(&mut sum, part, 1.0));
+    sum
 }
 
 /// Sum of the `chosen` effects in the error of a drive in motion like that of `sessions`, row by row, arcsec.

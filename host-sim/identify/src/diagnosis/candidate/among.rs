@@ -6,6 +6,8 @@
 //! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the
 //! later one is evaluated with the earlier in place, and together they make what both do.
 
+use std::borrow::Cow;
+
 use super::{Coefficients, Excitation, Law, Tag};
 use crate::causes::Kin;
 use crate::diagnosis::base::Base;
@@ -19,20 +21,13 @@ pub(crate) type Zones = [Vec<f64>; 2];
 #[derive(Clone)]
 pub(crate) struct Acting<'l> {
     /// Its law.
-    pub law: &'l Law,
+    pub law: Cow<'l, Law>,
     /// Shape parameters.
     pub values: Vec<f64>,
     /// The roles of its columns.
     pub roles: Vec<Tag>,
     /// Coefficients of its columns.
     pub coefficients: Vec<f64>,
-}
-
-impl Acting<'_> {
-    /// Coefficients by what their columns are.
-    fn by_role(&self) -> Coefficients<'_> {
-        Coefficients::new(&self.roles, &self.coefficients)
-    }
 }
 
 /// The excitation of a cause as others leave it.
@@ -53,13 +48,8 @@ impl Law {
     #[must_use]
     pub(crate) fn acts_on(&self, other: &Law) -> bool {
         // A spring that is out of tolerance is one under the torque recorded.
-        self.is_load() && !other.is_load() && !other.is_spring()
+        self.is_load() && !other.is_load() && other.acts.tolerance_of != Some(STIFFNESS)
             || other.acts.meets_zones && (self.acts.zones.is_some() || self.wrong.kin == Kin::Clearance)
-    }
-
-    /// Whether it is the spring of the nominal model that is softer or stiffer.
-    fn is_spring(&self) -> bool {
-        self.acts.tolerance_of == Some(STIFFNESS)
     }
 
     /// Whether two act on each other.
@@ -91,7 +81,8 @@ impl Among {
                     let sum = widened.get_or_insert_with(|| vec![0.0; on.rows.len()]);
                     add_scaled(sum, &half_width(&on, cause), 1.0);
                 }
-                if let Some(more) = cause.law.zones(&on, &cause.values, cause.by_role()) {
+                let coefficients = Coefficients::new(&cause.roles, &cause.coefficients);
+                if let Some(more) = cause.law.zones(&on, &cause.values, coefficients) {
                     let sum = zones.get_or_insert_with(|| [0; 2].map(|_| vec![0.0; on.rows.len()]));
                     sum.iter_mut().zip(&more).for_each(|(sum, more)| add_scaled(sum, more, 1.0));
                 }
@@ -131,11 +122,19 @@ pub(crate) fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<su
     (0..causes.len())
         .map(|k| {
             let others = causes.iter().enumerate().filter(|(j, other)| {
-                *j != k && other.law.acts_on(causes[k].law) && (*j < k || !other.law.meets(causes[k].law))
+                *j != k && other.law.acts_on(&causes[k].law) && (*j < k || !other.law.meets(&causes[k].law))
             });
             let acting: Vec<Acting<'_>> = others.map(|(_, acting)| acting.clone()).collect();
             let among = Among::of(on, &acting);
             causes[k].law.columns(&left_by(among.as_ref(), on), &causes[k].values)
         })
         .collect()
+}
+
+/// What each of the causes that are there together adds to the error, arcsec, row by row.
+pub(crate) fn added(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<f64>> {
+    let of = |(cause, columns): (&Acting<'_>, Vec<super::Regressor>)| {
+        combined(on.rows.len(), columns.iter().map(|column| column.values.as_slice()), &cause.coefficients)
+    };
+    causes.iter().zip(together(on, causes)).map(of).collect()
 }

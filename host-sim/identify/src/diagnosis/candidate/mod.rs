@@ -37,12 +37,12 @@ use crate::nominal::Nominal;
 use flexspline_base::robust::least_and_most;
 use flexspline_design::kernels::Kernels;
 
-pub(crate) use among::{Acting, Among, Zones, left_by, together};
+pub(crate) use among::{Acting, Among, Zones, added, left_by, together};
 pub(crate) use generic::{line, maps, unnamed};
 pub(crate) use geometry::standing_pitch_error;
 pub(crate) use label::{Label, Per};
 pub use named::{Coefficients, Shaped, Tag};
-pub(crate) use simulated::{Simulated, Values, added};
+pub(crate) use simulated::{Simulated, Values};
 
 /// The rows that laws are evaluated on, and what is known of them.
 #[derive(Clone, Copy)]

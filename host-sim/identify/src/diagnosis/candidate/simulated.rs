@@ -1,8 +1,9 @@
 //! A cause of known parameters: the way back from the parameters of a report to its law.
 
-use super::{Acting, Excitation, Law, Named, Tag, Tolerance, together};
+use std::borrow::Cow;
+
+use super::{Acting, Excitation, Law, Named, Tag, Tolerance};
 use crate::causes::ParameterName;
-use crate::diagnosis::rows::combined;
 
 /// The values of the parameters of a cause, by their names.
 pub(crate) type Values<'v> = &'v dyn Fn(ParameterName) -> f64;
@@ -38,14 +39,6 @@ impl Simulated {
         };
         let coefficients = columns.iter().map(coefficient).collect();
         let roles = columns.iter().map(|column| column.role).collect();
-        Acting { law: &self.law, values: self.shape.clone(), roles, coefficients }
+        Acting { law: Cow::Borrowed(&self.law), values: self.shape.clone(), roles, coefficients }
     }
-}
-
-/// Sum of the causes in the error, arcsec, row by row.
-pub(crate) fn added(on: &Excitation<'_>, causes: &[Simulated]) -> Vec<f64> {
-    let acting: Vec<Acting<'_>> = causes.iter().map(|cause| cause.acting(on)).collect();
-    let columns = together(on, &acting);
-    let coefficients: Vec<f64> = acting.iter().flat_map(|cause| cause.coefficients.iter().copied()).collect();
-    combined(on.rows.len(), columns.iter().flatten().map(|column| column.values.as_slice()), &coefficients)
 }
