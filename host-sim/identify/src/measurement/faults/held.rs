@@ -158,8 +158,11 @@ pub(in crate::measurement) fn check_coarse_torque(log: &mut Log, findings: &mut 
     let fault = log.fault(FaultName::Quantisation, 0..log.len());
     let levels = log.runs(torque, 1, |a, b| a == b);
     if !goes_on_between(log, &levels) {
-        let fault = fault.filter(|_| is_of_a_sensor(torque, &levels, step));
-        findings.add(fault, Quantity::Torque, Treatment::Kept, |_| {
+        let torn = levels.iter().filter(|rows| rows.len() < LEAST_ROWS).count();
+        let steps: HashSet<i64> = torque.iter().map(|torque| (torque / step).round() as i64).collect();
+        // Else nothing shows that they are those of a sensor.
+        let of_a_sensor = steps.len() >= MANY_STEPS && (torn as f64) >= TORN * levels.len() as f64;
+        findings.add(fault.filter(|_| of_a_sensor), Quantity::Torque, Treatment::Kept, |_| {
             format!(
                 "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and \
                  nothing in the rows tells it"
@@ -187,13 +190,6 @@ pub(in crate::measurement) fn check_coarse_torque(log: &mut Log, findings: &mut 
              one to the next it is halfway, and a curve through these points stands in{left_out}"
         )
     });
-}
-
-/// Whether steps are those of a sensor, between which nothing shows where the load is.
-fn is_of_a_sensor(torque: &[f64], levels: &[Range<usize>], step: f64) -> bool {
-    let torn = levels.iter().filter(|rows| rows.len() < LEAST_ROWS).count();
-    let steps: HashSet<i64> = torque.iter().map(|torque| (torque / step).round() as i64).collect();
-    steps.len() >= MANY_STEPS && (torn as f64) >= TORN * levels.len() as f64
 }
 
 /// Where the load is known, in stretches of a session without a change by more than one step: there it is put on, or
@@ -229,31 +225,23 @@ fn stretches(log: &Log, torque: &[f64], step: f64) -> Vec<Vec<Known>> {
     found
 }
 
+/// Sweeps that solve for the slopes of a curve. *Source*: derived, each leaves half of what is off at most, and the
+/// slopes of a load are known to less than a millionth then.
+const SWEEPS: usize = 40;
+
 /// Slopes of the natural cubic spline through what is known: of all curves the least bent one, as a load is that a
-/// machine swings. A tridiagonal system, solved by elimination (Thomas).
+/// machine swings. Where pieces meet both are bent alike (Gauss and Seidel).
 fn slopes(known: &[Known]) -> Vec<f64> {
-    let length = |k: usize| known[k + 1].0 - known[k].0;
-    let chord = |k: usize| (known[k + 1].1 - known[k].1) / length(k);
-    let Some(last) = known.len().checked_sub(1).filter(|last| *last > 0) else { return vec![0.0; known.len()] };
-    // Before, on and after the diagonal, and the right side.
-    let row = |k: usize| match k {
-        0 => [0.0, 2.0, 1.0, 3.0 * chord(0)],
-        k if k == last => [1.0, 2.0, 0.0, 3.0 * chord(last - 1)],
-        k => {
-            let (h, g) = (length(k - 1), length(k));
-            [g, 2.0 * (h + g), h, 3.0 * (g * chord(k - 1) + h * chord(k))]
-        }
-    };
-    let (mut after, mut slopes) = (Vec::with_capacity(last + 1), Vec::with_capacity(last + 1));
-    for k in 0..=last {
-        let [before, on, next, right] = row(k);
-        let (above, known) = if k > 0 { (after[k - 1], slopes[k - 1]) } else { (0.0, 0.0) };
-        let pivot = on - before * above;
-        after.push(next / pivot);
-        slopes.push((right - before * known) / pivot);
-    }
-    for k in (0..last).rev() {
-        slopes[k] -= after[k] * slopes[k + 1];
+    let mut slopes = vec![0.0; known.len()];
+    for k in (0..SWEEPS).flat_map(|_| 0..known.len()) {
+        let beside = [k.wrapping_sub(1), k + 1].into_iter().filter(|beside| *beside < known.len());
+        let sides = beside.map(|beside| {
+            let length = known[beside].0 - known[k].0;
+            let chord = (known[beside].1 - known[k].1) / length;
+            [(3.0 * chord - slopes[beside]) / length.abs(), 2.0 / length.abs()]
+        });
+        let [right, on] = sides.fold([0.0; 2], |sum, side| [sum[0] + side[0], sum[1] + side[1]]);
+        slopes[k] = right / on;
     }
     slopes
 }
