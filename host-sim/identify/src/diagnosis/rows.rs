@@ -6,7 +6,7 @@ use std::ops::Range;
 
 pub(crate) use crate::least_squares::{add_scaled, combined};
 pub(crate) use crate::measurement::rms;
-use crate::measurement::{Session, neighbours, quantile_of, rates};
+use crate::measurement::{Session, cubic_at_zero, neighbours, quantile_of, rates};
 use crate::nominal::Nominal;
 use flexspline::FixedMember;
 pub(super) use flexspline_base::statistics::mean;
@@ -141,12 +141,7 @@ impl Rows {
                 if t[3] - t[0] > FAR_APART * (t[2] - t[1]).max(0.0) || t.windows(2).any(|t| t[1] <= t[0]) {
                     continue;
                 }
-                angle[k] = (0..4)
-                    .map(|j| {
-                        let weight = (0..4).filter(|i| *i != j).map(|i| -t[i] / (t[j] - t[i])).product::<f64>();
-                        weight * self.generator[beside[j]]
-                    })
-                    .sum();
+                angle[k] = cubic_at_zero([0, 1, 2, 3].map(|j| (t[j], self.generator[beside[j]])));
             }
         }
         angle

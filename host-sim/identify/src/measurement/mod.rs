@@ -180,6 +180,12 @@ pub fn directions(angle: &[f64]) -> Vec<f64> {
     turns.into_iter().map(|(way, _)| if way == 0.0 { first } else { way }).collect()
 }
 
+/// Where the cubic through four points has the abscissa 0.
+pub(crate) fn cubic_at_zero(points: [(f64, f64); 4]) -> f64 {
+    let weight = |x: f64| points.iter().filter(|(at, _)| *at != x).map(|(at, _)| at / (at - x)).product::<f64>();
+    points.iter().map(|(x, value)| value * weight(*x)).sum()
+}
+
 /// The rows before and after row `k` of a session, or that row at its ends.
 pub(crate) fn neighbours(session: &Range<usize>, k: usize) -> [usize; 2] {
     [k.max(session.start + 1) - 1, (k + 1).min(session.end - 1)]

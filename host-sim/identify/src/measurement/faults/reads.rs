@@ -20,6 +20,7 @@ use super::state::StateModel;
 use super::{ARCSEC, Findings, farthest, marked};
 use crate::least_squares::Normal;
 use crate::measurement::columns::Quantity;
+use crate::measurement::cubic_at_zero;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
@@ -114,14 +115,7 @@ impl<'a> Reads<'a> {
         if d - a > 2 * 5 || self.log.number(*a) != self.log.number(*d) {
             return 0.0;
         }
-        let around = [a, b, c, d].map(|at| (*at as f64 - *row as f64, self.error[*at]));
-        let cubic: f64 = around
-            .iter()
-            .map(|(x, error)| {
-                error * around.iter().filter(|(at, _)| at != x).map(|(at, _)| at / (at - x)).product::<f64>()
-            })
-            .sum();
-        self.error[*row] - cubic
+        self.error[*row] - cubic_at_zero([a, b, c, d].map(|at| (*at as f64 - *row as f64, self.error[*at])))
     }
 
     /// Rows off by far more than their speed lets expect, and by more than their neighbours: they leave the good ones.
