@@ -223,7 +223,7 @@ impl<'a> Search<'a> {
             explained.iter_mut().zip(hidden.iter().flatten()).for_each(|(sum, fast)| *sum += fast);
             let before = last.as_ref().map(|(problem, _)| problem.fineness.noise);
             let explained_now: &[f64] = if new_line { &[] } else { &explained };
-            let (noise, worth) = prepare::noise(on, free_now, explained_now, &uncertain, before);
+            let (noise, worth) = prepare::noise(on, free_now, explained_now, &uncertain);
             let as_before = |before: Noise| (0.85..1.18).contains(&(noise.floor() / before.floor()));
             if !new_line && !other_rows && !closer_look && before.is_some_and(as_before) {
                 break;

@@ -344,16 +344,9 @@ fn directions(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
 
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by
 /// its evidence with the main columns of all laws as free columns. Returns also the worth of the information: below 1
-/// where innovations are not white. `explained` is what is explained already, row by row; `near` is what was found
-/// before.
+/// where innovations are not white. `explained` is what is explained already, row by row.
 #[must_use]
-pub fn noise(
-    on: &Excitation<'_>,
-    columns: &FreeColumns,
-    explained: &[f64],
-    uncertain: &[bool],
-    near: Option<Noise>,
-) -> (Noise, f64) {
+pub fn noise(on: &Excitation<'_>, columns: &FreeColumns, explained: &[f64], uncertain: &[bool]) -> (Noise, f64) {
     let rows = on.rows;
     let left = on.left(explained);
     let white = white_level(rows, &left);
@@ -373,10 +366,7 @@ pub fn noise(
     // Some cannot be judged: each is asked once.
     let mut asked = vec![false; hypotheses.len()];
     let mut best = 0;
-    let mut next = match near {
-        Some(near) => beside(nearest(&hypotheses, near)),
-        None => FIRST.to_vec(),
-    };
+    let mut next = FIRST.to_vec();
     // From a few up the evidence, until all beside the best have been judged.
     while !next.is_empty() {
         let judge = |k: &usize| (*k, judge_under(Whitener::new(rows, &uncertain, stride, hypotheses[*k])));
@@ -428,18 +418,6 @@ fn beside(hypothesis: usize) -> Vec<usize> {
     let grid =
         around(row, WANDERS.len()).flat_map(|row| around(column, width).map(move |column| 1 + row * width + column));
     if row == 0 { [0].into_iter().chain(grid).collect() } else { grid.collect() }
-}
-
-/// The hypothesis that is most like this one.
-fn nearest(hypotheses: &[Noise], noise: Noise) -> usize {
-    if noise.wander == 0.0 {
-        return 0;
-    }
-    let apart = |other: &Noise| {
-        let of = |a: f64, b: f64| (a / b).ln().abs();
-        of(other.wander / other.white, noise.wander / noise.white) + of(other.correlation_s, noise.correlation_s)
-    };
-    (1..hypotheses.len()).min_by(|a, b| apart(&hypotheses[*a]).total_cmp(&apart(&hypotheses[*b]))).unwrap_or(0)
 }
 
 /// How well a hypothesis of the noise tells what is left.

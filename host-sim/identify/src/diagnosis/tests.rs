@@ -845,7 +845,6 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
                 &super::FreeColumns::of(on, &laws, 1),
                 &[],
                 &super::prepare::uncertain(on, &[], &[]),
-                None,
             )
             .0,
         );
