@@ -185,12 +185,6 @@ impl Whitener {
         white.into_iter().take(averaged.len()).collect()
     }
 
-    /// Innovations of a column of rows.
-    #[must_use]
-    pub(crate) fn whiten(&self, column: &[f64]) -> Vec<f64> {
-        self.whiten_averaged(&self.average(column))
-    }
-
     /// The filter's estimate of the wander in averaged values.
     #[must_use]
     pub(crate) fn followed(&self, averaged: &[f64]) -> Vec<f64> {

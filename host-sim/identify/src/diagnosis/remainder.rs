@@ -46,7 +46,7 @@ fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Ve
     let on = &problem.on;
     let left = on.left(&explained(problem, selected));
     let whitener = Whitener::new(on.rows, &problem.uncertain, 1, noise);
-    let mut white = whitener.in_rows(&whitener.whiten(&left), on.rows.len());
+    let mut white = whitener.in_rows(&whitener.whiten_averaged(&whitener.average(&left)), on.rows.len());
     for (value, uncertain) in white.iter_mut().zip(&problem.uncertain) {
         *value = if *uncertain { 0.0 } else { value.clamp(-6.0, 6.0) };
     }

@@ -72,7 +72,7 @@ pub(super) fn rivals<'l>(
                 found.into_iter().partition(|found| found.misfit < NEAR);
             let near_laws: Vec<&Law> = near.iter().map(|found| found.law).collect();
             let from_there = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
-                near.iter().filter(|found| found.law.id() == law.id()).map(|found| found.places.clone()).collect()
+                near.iter().filter(|found| found.law.id == law.id).map(|found| found.places.clone()).collect()
             };
             let near = refitted(problem, &near_laws, selected, from_there, (k, size));
             near.into_iter().chain(far).collect()

@@ -107,13 +107,8 @@ impl Rows {
             }
             let begin = rows.time.get(from).copied().unwrap_or(0.0);
             rows.since.extend(rows.time[from..].iter().map(|time| time - begin).collect::<Vec<f64>>());
-            match &session.loudness {
-                Some(loudness) => {
-                    rows.jitters = true;
-                    rows.loudness.extend(loudness);
-                }
-                None => rows.loudness.resize(from + len, 1.0),
-            }
+            rows.jitters |= session.loudness.is_some();
+            rows.loudness.extend(or(&session.loudness, true, len, 1.0));
             rows.unsure_s = rows.unsure_s.max(session.unsure_s);
             rows.rounding = rows.rounding.max(session.coarse_rad * ARCSEC_PER_RAD / 12f64.sqrt());
             if session.own_zero {
@@ -274,12 +269,6 @@ impl Rows {
             last = session.clone().last();
         }
         reached
-    }
-
-    /// Noise of all rows together, root mean square, against that of a row of mean worth.
-    #[must_use]
-    pub(crate) fn loudness_rms(&self) -> f64 {
-        if self.jitters { rms(&self.loudness) } else { 1.0 }
     }
 
     /// A high percentile of the torque's magnitude, N·m: the scale of the load.

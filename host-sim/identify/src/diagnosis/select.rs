@@ -163,7 +163,7 @@ impl Bests {
     fn note(&mut self, law: &Law, tried: &[(f64, Vec<f64>)]) {
         let mut best: Vec<&(f64, Vec<f64>)> = tried.iter().collect();
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let known = self.tried.entry(law.id()).or_default();
+        let known = self.tried.entry(law.id).or_default();
         for (_, places) in best.into_iter().take(NOTED) {
             if !known.contains(places) {
                 known.push(places.clone());
@@ -173,7 +173,7 @@ impl Bests {
 
     /// Notes a refined term that came close.
     fn came_close(&mut self, term: &Term<'_>) {
-        let known = self.close.entry(term.law.id()).or_default();
+        let known = self.close.entry(term.law.id).or_default();
         known.retain(|places| *places != term.places);
         known.insert(0, term.places.clone());
         known.truncate(NOTED);
@@ -182,15 +182,10 @@ impl Bests {
     /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or
     /// before, and where its lead points now.
     pub fn begin(&self, scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law) -> Vec<Vec<f64>> {
-        match self.tried.get(&law.id()).filter(|_| law.search.lead.is_none()) {
+        match self.tried.get(&law.id).filter(|_| law.search.lead.is_none()) {
             Some(known) => known.clone(),
             None => scaffold.begin(law),
         }
-    }
-
-    /// Places to begin with a law that came close.
-    fn begin_close(&self, law: &Law) -> Vec<Vec<f64>> {
-        self.close.get(&law.id()).cloned().unwrap_or_default()
     }
 }
 
@@ -231,7 +226,7 @@ fn best_tried<'l>(
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (mut terms, mut refused) = (Vec::new(), Vec::new());
-    for law in laws.iter().filter(|law| found.iter().all(|(_, other, _)| other.id() != law.id())) {
+    for law in laws.iter().filter(|law| found.iter().all(|(_, other, _)| other.id != law.id)) {
         refused.push((*law, vec![Judged::plain(Gate::Refined, false)]));
     }
     let mut counted = HashSet::new();
@@ -251,7 +246,7 @@ fn best_tried<'l>(
             None => vec![Judged::plain(Gate::Refined, false)],
         });
         if passed(&refused_for) {
-            counted.insert(law.id());
+            counted.insert(law.id);
         } else if law.shapes.is_empty() || !counted.is_empty() {
             // What tells the data better than all these may make sense at places nearby; others do not.
             refused.push((law, refused_for));
@@ -486,11 +481,11 @@ impl<'l> Chooser<'_, '_, 'l> {
     /// Takes in one more term, if one earns its place.
     fn forward(&mut self, selected: &Selected<'l>) -> Option<Selected<'l>> {
         let (problem, everything) = (self.problem, self.scope == Scope::Everything);
-        self.trace.next_round();
+        self.trace.round += 1;
         let named = selected.terms.iter().filter(|t| t.law.named()).count();
         let unnamed = selected.terms.len() - named;
         let mut open: Vec<&Law> = Vec::new();
-        for law in self.laws.iter().filter(|law| everything || self.bests.close.contains_key(&law.id())) {
+        for law in self.laws.iter().filter(|law| everything || self.bests.close.contains_key(&law.id)) {
             if selected.terms.iter().any(|t| t.law.label == law.label) {
                 continue;
             }
@@ -509,7 +504,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             open.iter().zip(&tried).for_each(|(law, tried)| self.bests.note(law, tried));
             (tried, REFINED)
         } else {
-            (tried(&scaffold, &open, |law| self.bests.begin_close(law)), REFINED_AGAIN)
+            (tried(&scaffold, &open, |law| self.bests.close.get(&law.id).cloned().unwrap_or_default()), REFINED_AGAIN)
         };
         let (found, refused) = best_tried(&scaffold, &open, tried, most);
         for (law, gates) in refused {

@@ -105,7 +105,7 @@ impl Gate {
 }
 
 /// A gate with what came to it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Judged {
     /// The gate.
     pub gate: Gate,
@@ -114,6 +114,7 @@ pub struct Judged {
     /// The limit.
     pub limit: Option<f64>,
     /// Whether the value has to be below the limit, not above.
+    #[serde(skip)]
     pub is_below: bool,
     /// Whether it let it through.
     pub passed: bool,
@@ -172,25 +173,17 @@ impl Decision {
     pub fn deciding(&self) -> Option<&Judged> {
         self.gates.iter().find(|judged| !judged.passed).or(self.gates.last())
     }
-
-    fn value_at(&self, gate: Gate) -> Option<f64> {
-        self.gates.iter().find(|judged| judged.gate == gate).and_then(|judged| judged.value)
-    }
 }
 
 /// All decisions in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     steps: Vec<Decision>,
-    round: usize,
+    /// The round of the search that is going on, from 1; 0 before it.
+    pub(super) round: usize,
 }
 
 impl Trace {
-    /// Another round of the search begins.
-    pub(super) fn next_round(&mut self) {
-        self.round += 1;
-    }
-
     /// A decision on a law or a cause, held against another where there is one.
     pub(super) fn decided(&mut self, stage: Stage, label: Label, against: Option<Label>, gates: Vec<Judged>) {
         self.steps.push(Decision { label, stage, round: self.round, against, gates });
@@ -213,7 +206,7 @@ impl Trace {
         let gained = |step: &Decision| {
             [Gate::Evidence, Gate::Gain, Gate::First, Gate::Refined]
                 .into_iter()
-                .find_map(|gate| step.value_at(gate))
+                .find_map(|gate| step.gates.iter().find(|judged| judged.gate == gate)?.value)
                 .unwrap_or(f64::NEG_INFINITY)
         };
         let beside = self.of(cause).filter(|step| step.round == last.round && !step.passed() && search(step));
@@ -233,14 +226,12 @@ impl Trace {
 
 /// One gate of a step, as it stands in `diagnosis.json`.
 #[derive(Serialize)]
-struct TraceEntry {
+struct TraceEntry<'a> {
     cause: String,
     stage: Stage,
     round: usize,
-    gate: Gate,
-    value: Option<f64>,
-    limit: Option<f64>,
-    passed: bool,
+    #[serde(flatten)]
+    judged: &'a Judged,
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<String>,
 }
@@ -250,15 +241,9 @@ pub(crate) struct TraceEntries<'a>(pub Vec<&'a Decision>);
 
 impl Serialize for TraceEntries<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let entry = |step: &Decision, judged: &Judged| TraceEntry {
-            cause: step.label.to_string(),
-            stage: step.stage,
-            round: step.round,
-            gate: judged.gate,
-            value: judged.value.filter(|value| value.is_finite()),
-            limit: judged.limit.filter(|limit| limit.is_finite()),
-            passed: judged.passed,
-            against: step.against.map(|against| against.to_string()),
+        let entry = |step: &Decision, judged| {
+            let (cause, against) = (step.label.to_string(), step.against.map(|against| against.to_string()));
+            TraceEntry { cause, stage: step.stage, round: step.round, judged, against }
         };
         serializer.collect_seq(self.0.iter().flat_map(|step| step.gates.iter().map(move |judged| entry(step, judged))))
     }

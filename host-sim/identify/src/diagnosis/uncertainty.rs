@@ -95,12 +95,6 @@ impl TermCovariance {
         self.of(form).max(laplace)
     }
 
-    /// The same with all of the jackknife: for what stands beside something that is not understood.
-    fn at_worst(&self, form: &[f64]) -> f64 {
-        let (within, jackknife, _) = self.parts(form);
-        within.max(jackknife)
-    }
-
     /// Variances: within the blocks, by the jackknife, and what Laplace's lacks.
     fn parts(&self, form: &[f64]) -> (f64, f64, f64) {
         let trace = |covariance: &[f64]| robust::dot(form, covariance);
@@ -215,9 +209,11 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
         let (parameters, size_told) = parameters(problem, term, coefficients, &spread, beyond);
         let times = |variance: f64| (adds / variance.max(1e-30)).sqrt();
         let all_told = times(spread.beyond_noise(&products, beyond));
+        let (within, jackknife, _) = spread.parts(&products);
         all.push(Known {
             parameters,
-            times_its_doubt: times(spread.at_worst(&products)),
+            // With all of the jackknife: this is for what stands beside something that is not understood.
+            times_its_doubt: times(within.max(jackknife)),
             size_told,
             told_from_zero: if size_told > INTERVAL && all_told > KNOWN_BESIDE {
                 all_told.max(size_told)

@@ -11,6 +11,7 @@ use super::report::{
     Cause, Compensation, Diagnosis, EvidenceBy, Finding, HeldOut, Hint, Parameter, Residual, SetOfCauses, Unexplained,
     Verdict,
 };
+use super::rows::rms;
 use super::select::{self, Selected, Standing, standings};
 use super::thresholds::selection::OUT_OF_TOLERANCE;
 use super::thresholds::verdict::*;
@@ -52,7 +53,7 @@ pub(super) fn conclude(
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
 
     let known = known(problem, selected, noise);
-    let unnamed = Unnamed::beside(selected, &standings, &left_over, &hidden_lines);
+    let unnamed = unnamed(selected, &standings, &left_over, &hidden_lines);
     let left_of_noise = rms_after / floor.max(1e-30);
     let named = understood(problem, selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
     let held = held_out::evaluate(problem, &selected.terms);
@@ -273,44 +274,29 @@ fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: Hel
     rms_after <= NEAR_NOISE * floor && compared.rms_extended_tables_arcsec < best_without
 }
 
-/// Sizes of what has no name, arcsec: the largest, all together, and lines in time with their frequencies, Hz. A zero
-/// that the bench sets in each session is none of it.
-struct Unnamed {
-    largest: f64,
-    together: f64,
-    in_time: Vec<(f64, f64)>,
+/// What has no name, with its size, arcsec; its label where it has one. A zero that the bench sets in each session is
+/// none of it.
+fn unnamed(
+    selected: &Selected<'_>,
+    standings: &[Standing],
+    left_over: &[Unexplained],
+    hidden_lines: &[Label],
+) -> Vec<(Option<Label>, f64)> {
+    let terms = selected.terms.iter().zip(standings);
+    let terms = terms
+        .filter(|(term, _)| !term.law.named() && !term.law.is_zero_of_sessions())
+        .map(|(term, standing)| (Some(term.law.label), standing.size));
+    let hidden = |called: &str| hidden_lines.iter().find(|line| line.to_string() == called).copied();
+    terms.chain(left_over.iter().map(|left| (hidden(&left.looks_like), left.size_arcsec))).collect()
 }
 
-impl Unnamed {
-    fn beside(
-        selected: &Selected<'_>,
-        standings: &[Standing],
-        left_over: &[Unexplained],
-        hidden_lines: &[Label],
-    ) -> Unnamed {
-        let terms = selected.terms.iter().zip(standings);
-        let terms = terms
-            .filter(|(term, _)| !term.law.named() && !term.law.is_zero_of_sessions())
-            .map(|(term, standing)| (Some(term.law.label), standing.size));
-        let hidden = |called: &str| hidden_lines.iter().find(|line| line.to_string() == called).copied();
-        let left = left_over.iter().map(|left| (hidden(&left.looks_like), left.size_arcsec));
-        let all: Vec<(Option<Label>, f64)> = terms.chain(left).collect();
-        let in_time = |label: Option<Label>| match label {
-            Some(Label::Line { per: Per::Second, order }) => Some(order),
-            _ => None,
-        };
-        Unnamed {
-            largest: all.iter().map(|(_, size)| *size).fold(0.0, f64::max),
-            together: all.iter().map(|(_, size)| *size).fold(0.0, f64::hypot),
-            in_time: all.iter().filter_map(|(label, size)| Some((in_time(*label)?, *size))).collect(),
-        }
-    }
-
-    /// The largest line in time near a frequency, arcsec.
-    fn swinging_near(&self, frequency_hz: f64) -> f64 {
-        let near = |line: &&(f64, f64)| (line.0 - frequency_hz).abs() < SWINGS_NEAR * frequency_hz;
-        self.in_time.iter().filter(near).map(|(_, size)| *size).fold(0.0, f64::max)
-    }
+/// The largest line in time near a frequency, arcsec.
+fn swinging_near(unnamed: &[(Option<Label>, f64)], frequency_hz: f64) -> f64 {
+    let near = |label: &Option<Label>| match label {
+        Some(Label::Line { per: Per::Second, order }) => (order - frequency_hz).abs() < SWINGS_NEAR * frequency_hz,
+        _ => false,
+    };
+    unnamed.iter().filter(|(label, _)| near(label)).map(|(_, size)| *size).fold(0.0, f64::max)
 }
 
 /// Which terms are causes that may be named. Of what is left: the white noise, arcsec, and how much of noise it is.
@@ -319,25 +305,27 @@ fn understood(
     selected: &Selected<'_>,
     standings: &[Standing],
     known: &[Known],
-    unnamed: &Unnamed,
+    unnamed: &[(Option<Label>, f64)],
     [white, left_of_noise]: [f64; 2],
     trace: &mut Trace,
 ) -> Vec<usize> {
     let is_named = |k: &usize| selected.terms[*k].law.named();
+    let sizes = || unnamed.iter().map(|(_, size)| *size);
+    let (largest, together) = (sizes().fold(0.0, f64::max), sizes().fold(0.0, f64::hypot));
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {
         let size = standings[k].size;
         let mut gates = vec![Judged::above(Gate::ToldFromZero, known[k].told_from_zero, TOLD_FROM_ZERO)];
-        if unnamed.largest > LARGE_BESIDE * size {
+        if largest > LARGE_BESIDE * size {
             gates.push(Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE));
         }
         if load_makes_it(selected.terms[k].law.cause(), problem) {
-            let left = left_of_noise.hypot(unnamed.together / white);
+            let left = left_of_noise.hypot(together / white);
             gates.push(Judged::below(Gate::LoadKnown, left, NEAR_NOISE));
         }
         if let Some(frequency) = known[k].parameters.get(ParameterName::FrequencyHz.as_str()) {
             // What swings on at its own frequency, whatever the drive does, is driven by something else.
-            let share = unnamed.swinging_near(frequency.value) / size;
+            let share = swinging_near(unnamed, frequency.value) / size;
             gates.push(Judged::below(Gate::NoLineBeside, share, LARGE_BESIDE));
         }
         gates.extend(growth_with_speed(problem, selected, &known[k], k));
@@ -360,7 +348,7 @@ fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Kno
 /// Noise of an average, wander with it, arcsec.
 fn floor(problem: &Problem<'_>, noise: Noise) -> f64 {
     let rows_of_an_average = problem.on.rows.count_used() as f64 / problem.data.len() as f64;
-    (noise.white * problem.on.rows.loudness_rms() / rows_of_an_average.sqrt()).hypot(noise.wander)
+    (noise.white * rms(&problem.on.rows.loudness) / rows_of_an_average.sqrt()).hypot(noise.wander)
 }
 
 /// How well each term is known beside the others.
@@ -573,9 +561,10 @@ mod tests {
 
     #[test]
     fn a_line_in_time_near_a_resonance_is_counted_against_it_and_one_elsewhere_is_not() {
-        let unnamed = Unnamed { largest: 4.0, together: 5.0, in_time: vec![(1.33, 4.0), (50.0, 3.0)] };
-        assert_eq!(unnamed.swinging_near(1.37), 4.0);
-        assert_eq!(unnamed.swinging_near(9.0), 0.0);
+        let unnamed =
+            [(1.33, 4.0), (50.0, 3.0)].map(|(order, size)| (Some(Label::Line { per: Per::Second, order }), size));
+        assert_eq!(swinging_near(&unnamed, 1.37), 4.0);
+        assert_eq!(swinging_near(&unnamed, 9.0), 0.0);
     }
 
     #[test]

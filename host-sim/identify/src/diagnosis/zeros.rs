@@ -1,7 +1,7 @@
 //! A bench that sets its zero anew in each session: reported as a fault of the data, with what each session's zero is.
 
 use super::report::Parameter;
-use crate::measurement::{Fault, FaultName, Recording, Treatment};
+use crate::measurement::{Fault, FaultName, Recording, Treatment, throughout};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// The remedy where the zero is set anew.
@@ -26,8 +26,7 @@ pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
     let largest = all.iter().map(|zero| zero - all[0]).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
     let said: Vec<String> = all[1..].iter().take(SAID).map(|zero| format!("{:+.1}", zero - all[0])).collect();
     let more = if all.len() - 1 > said.len() { ", …" } else { "" };
-    let last = all.len();
-    let sessions = if last == 2 { "session 2".to_owned() } else { format!("sessions 2 to {last}") };
+    let sessions = if all.len() == 2 { "session 2".to_owned() } else { format!("sessions 2 to {}", all.len()) };
     let what = format!(
         "the zero of the error is another one in each session: that of {sessions} lies {}{more} arcsec (± {std:.1} at \
          most) beside that of the first, by no whole number of motor turns or tooth pitches; the zero of each is \
@@ -37,18 +36,9 @@ pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
     for session in recording.sessions.iter_mut().skip(1) {
         session.own_zero = true;
     }
-    let (first, end) = (&recording.sessions[1], &recording.sessions[last - 1]);
-    let lines = [first.line.first().copied().unwrap_or_default(), end.line.last().copied().unwrap_or_default()];
-    let rows = recording.sessions[1..].iter().map(|session| session.len() as u64).sum();
-    recording.faults.push(Fault {
-        time_s: first.time_s.as_ref().and_then(|time| time.first().copied()),
-        until_s: end.time_s.as_ref().and_then(|time| time.last().copied()),
-        size_arcsec: Some(largest),
-        treatment: Treatment::Repaired,
-        what,
-        advice: ADVICE,
-        ..Fault::new(FaultName::PositionJump, lines, rows)
-    });
+    let Some(all) = throughout(&recording.sessions[1..], FaultName::PositionJump) else { return };
+    let (size_arcsec, treatment) = (Some(largest), Treatment::Repaired);
+    recording.faults.push(Fault { size_arcsec, treatment, what, advice: ADVICE, ..all });
     recording.faults.sort_by_key(|fault| (fault.first_line, fault.name));
 }
 

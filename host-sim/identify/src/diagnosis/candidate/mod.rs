@@ -113,11 +113,6 @@ impl<'a> Excitation<'a> {
         cause.spec().needs.iter().copied().find(|need| !self.meets(*need))
     }
 
-    /// Whether these data speak of a cause.
-    fn speaks_of(&self, cause: CauseName) -> bool {
-        self.lacks(cause).is_none()
-    }
-
     fn meets(&self, need: Need) -> bool {
         let rows = self.rows;
         match need {
@@ -354,7 +349,8 @@ static LAWS: AtomicU64 = AtomicU64::new(0);
 /// acts on others.
 #[derive(Clone)]
 pub(crate) struct Law {
-    id: u64,
+    /// A number that no other law has.
+    pub id: u64,
     /// Its subject.
     pub label: Label,
     /// Which of several models of one cause it is: a word that stays the same from one recording to the next.
@@ -485,11 +481,6 @@ impl Law {
     #[must_use]
     pub fn is(&self, cause: CauseName) -> bool {
         self.cause() == Some(cause)
-    }
-    /// A number that no other law has.
-    #[must_use]
-    pub fn id(&self) -> u64 {
-        self.id
     }
     fn variant(mut self, variant: impl Into<Cow<'static, str>>) -> Law {
         self.variant = variant.into();
@@ -672,7 +663,11 @@ impl Law {
 /// Every law of every cause that the data can speak about.
 #[must_use]
 pub fn library(on: &Excitation<'_>) -> Vec<Law> {
-    CauseName::ALL.iter().filter(|cause| on.speaks_of(**cause)).flat_map(|cause| (cause.spec().laws)(on)).collect()
+    CauseName::ALL
+        .iter()
+        .filter(|cause| on.lacks(**cause).is_none())
+        .flat_map(|cause| (cause.spec().laws)(on))
+        .collect()
 }
 
 /// A column made row by row.

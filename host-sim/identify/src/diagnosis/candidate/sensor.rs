@@ -86,12 +86,6 @@ fn encoder_subdivision(of_output: bool, order: f64) -> Law {
 /// Delays of loggers are some milliseconds.
 const DELAY_S: f64 = 5e-3;
 
-/// The nominal prediction without changes of the flank, which take a time of their own.
-fn on_its_flank(on: &Excitation<'_>) -> Vec<f64> {
-    let of = |(said, flank): (&f64, &f64)| said - on.base.half_backlash * flank;
-    on.base.prediction.iter().zip(&on.base.flank).map(of).collect()
-}
-
 /// Change of values per second, row by row, from the neighbours in a session.
 pub(super) fn rate(on: &Excitation<'_>, values: &[f64]) -> Vec<f64> {
     rates(&on.rows.sessions, &on.rows.time, values)
@@ -103,8 +97,9 @@ fn sensor_latency() -> Law {
         let per_s = flexspline_base::units::ARCSEC_PER_RAD / on.nominal.ratio;
         let begun = on.scales.begin_s + 0.5 * on.scales.duration_s;
         let behind = |values: &[f64]| rate(on, values).into_iter().map(|by| -by).collect::<Vec<f64>>();
-        let of_angle: Vec<f64> =
-            on_its_flank(on).iter().zip(&on.base.wind_up).map(|(all, wind_up)| all - wind_up).collect();
+        // Without changes of the flank, which take a time of their own.
+        let of_angle =
+            by_row(on, |k| on.base.prediction[k] - on.base.half_backlash * on.base.flank[k] - on.base.wind_up[k]);
         let since = |k: usize| 2.0 * (on.rows.time[k] - begun) / on.scales.duration_s.max(1e-9);
         vec![
             main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Tag::SIZE),

@@ -127,14 +127,12 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
     let mut restarts: Vec<Turns> = Vec::new();
     // The rows at which sessions of another zero begin, with its change, rad.
     let mut others: Vec<(usize, f64)> = Vec::new();
-    let mut taken_off: Vec<(u32, f64)> = Vec::new();
     for (start, change) in between(&sessions) {
         let jump = change(&error);
         if let Some(turns) = whole_turns(-jump * gear.ratio) {
             restarts.push((start, turns));
         } else if !grows && jump.abs() > OTHER_ZERO_RAD && whole_pitches(jump, gear, NEAR_PITCHES, 0.0).is_none() {
             others.push((start, jump));
-            taken_off.push((log.number(start), taken_off.last().map_or(0.0, |(_, off)| *off) + jump));
         }
     }
     // One turn of the motor is two tooth pitches: alone it may be teeth that have skipped, and is left to the
@@ -164,17 +162,21 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
     findings.add(fault, None::<Quantity>, Treatment::Repaired, |fault| {
         fault.size_arcsec = Some(largest_arcsec);
         let numbers: Vec<String> =
-            taken_off.iter().take(LISTED).map(|(session, _)| (session + 1).to_string()).collect();
+            others.iter().take(LISTED).map(|(row, _)| (log.number(*row) + 1).to_string()).collect();
         format!(
             "the zero of {} sessions ({}{}) is another one, by up to {largest_arcsec:.0} arcsec, which is no whole \
              number of motor turns or tooth pitches: the zero of each is fitted on its own",
-            taken_off.len(),
+            others.len(),
             numbers.join(", "),
-            if taken_off.len() > LISTED { ", …" } else { "" }
+            if others.len() > LISTED { ", …" } else { "" }
         )
     });
     log.get_mut(Quantity::Output).into_iter().for_each(|output| add_steps(output, &others, -1.0));
-    log.zeros = taken_off;
+    let taken_off = |off: &mut f64, (row, jump): &(usize, f64)| {
+        *off += jump;
+        Some((log.number(*row), *off))
+    };
+    log.zeros = others.iter().scan(0.0, taken_off).collect();
 }
 
 /// Output less generator over ratio; none where the error was recorded.

@@ -78,18 +78,14 @@ fn carried_on([a, b, c]: [f64; AROUND_ONE]) -> f64 {
     median_of(&mut [a + 3.0 * slope, b + 2.0 * slope, c + slope])
 }
 
-/// Whether the load lets go of its flank next to a row: the teeth cross the clearance and strike. The row itself does
-/// not count, as it may be the one that is wrong.
-fn strikes(torque: &[f64], row: usize, largest_n_m: f64) -> bool {
+/// Whether the load moves the drive for a row: it stands out itself, or lets go of its flank next to the row, where the
+/// teeth cross the clearance and strike. The row itself does not count there, as it may be the one that is wrong.
+fn load_swings(torque: &[f64], row: usize, largest_n_m: f64) -> bool {
     let near = row.saturating_sub(AROUND_ONE)..(row + AROUND_ONE + 1).min(torque.len());
     let others = || near.clone().filter(|k| *k != row).map(|k| torque[k]);
     let (low, high) = least_and_most(others());
-    high - low > SWINGS * largest_n_m && others().any(|torque| torque.abs() < HELD * largest_n_m)
-}
-
-/// Whether the load moves the drive for a row: it lets go of a flank, or stands out itself.
-fn load_swings(torque: &[f64], row: usize, largest_n_m: f64) -> bool {
-    strikes(torque, row, largest_n_m) || out_by(torque, row).abs() > SWINGS * largest_n_m
+    let strikes = high - low > SWINGS * largest_n_m && others().any(|torque| torque.abs() < HELD * largest_n_m);
+    strikes || out_by(torque, row).abs() > SWINGS * largest_n_m
 }
 
 /// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.

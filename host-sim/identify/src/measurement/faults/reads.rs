@@ -267,27 +267,26 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     let late_share = late_rows as f64 / rows as f64;
     let period_s = period_s(log);
     let jitter_ms = jitter.as_ref().and_then(|jitter| Some(1e3 * period_s? * jitter.rows));
-    let mut said = Vec::new();
-    let mut size_rad = farthest(late.iter().map(|(_, off)| *off)).abs();
-    let late_said = (late_rows > 0).then(|| {
-        format!(
-            "{late_rows} rows ({:.1} %) are read late, by up to {:.0} arcsec: they are left out",
-            100.0 * late_share,
-            size_rad / ARCSEC
-        )
-    });
-    if let Some(Jitter { noise, rows }) = &jitter {
-        size_rad = rows * fast;
+    let late_rad = farthest(late.iter().map(|(_, off)| *off)).abs();
+    let size_rad = jitter.as_ref().map_or(late_rad, |jitter| jitter.rows * fast);
+    let scatters = jitter.as_ref().map(|Jitter { noise, rows }| {
         let of_time = jitter_ms.map_or(format!("{rows:.4} rows"), |ms| format!("{ms:.3} ms"));
-        said.push(format!(
+        format!(
             "the time between them scatters by {of_time}, {:.1} arcsec at full speed and {:.1} of noise: fast rows \
              are weighted down, to {:.2} of the weight of a row at rest",
             size_rad / ARCSEC,
             noise / ARCSEC,
             noise * noise / (noise * noise + size_rad * size_rad)
-        ));
-    }
-    said.extend(late_said);
+        )
+    });
+    let are_late = (late_rows > 0).then(|| {
+        format!(
+            "{late_rows} rows ({:.1} %) are read late, by up to {:.0} arcsec: they are left out",
+            100.0 * late_share,
+            late_rad / ARCSEC
+        )
+    });
+    let said: Vec<String> = scatters.into_iter().chain(are_late).collect();
     findings.add(log.fault(FaultName::ReadJitter, 0..rows), None::<Quantity>, Treatment::Masked, |fault| {
         fault.size_arcsec = Some(size_rad / ARCSEC);
         fault.measures.jitter_ms = jitter_ms;
