@@ -1,19 +1,11 @@
 //! Rows of a drive of which a model or a table is known, with what the diagnosis says of the sign of their torque and
 //! of angles in degrees, which no ratio shows.
 
-use std::f64::consts::TAU;
-
 use flexspline::Table;
 
 use crate::diagnosis::channels::{check_degrees, check_torque};
-use crate::least_squares::Normal;
-use crate::measurement::{
-    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Quantity, Recording, Refusal, Session, least_and_most,
-    parse_at_least,
-};
+use crate::measurement::{ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Recording, Session, parse_at_least};
 use crate::nominal::Nominal;
-use flexspline_base::statistics::mean;
-use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Fewest rows that a table is played over. *Source*: one has no mean to be about.
 pub(crate) const FEW: usize = 2;
@@ -34,8 +26,7 @@ pub fn parse_known(
     if read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
         return Ok(read);
     }
-    check_degrees(&read, columns, nominal, table)?;
-    check_waves(&read, columns, nominal.ratio)?;
+    check_degrees(&read, columns, nominal)?;
     let torques: Vec<_> = read.sessions.iter().map(|session| session.torque_n_m.clone()).collect();
     let before = read.faults.len();
     check_torque(&mut read, nominal, table);
@@ -48,64 +39,11 @@ pub fn parse_known(
     Ok(read)
 }
 
-/// Generator turns in degrees that tell waves from drift. *Guess*.
-const MANY_TURNS: f64 = 10.0;
-/// The reading that is meant leaves less than this share of the squares that the other leaves. *Guess*.
-const LEAVES: f64 = 0.5;
-/// Rows that are looked at, about.
-const LOOKED_AT: usize = 20_000;
-
-/// Refuses angles that are in degrees where radians are read, which no ratio shows: the error repeats in each turn of
-/// the generator in degrees and not in radians. A unit that the mapping says is believed.
-fn check_waves(read: &Recording, columns: &ColumnMap, ratio: f64) -> Result<(), MeasuredError> {
-    let (generator, said) = columns.column(Quantity::Generator);
-    let degree = 1f64.to_radians();
-    let (from, to) = least_and_most(read.sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
-    if said || (to - from) * degree < MANY_TURNS * TAU {
-        return Ok(());
-    }
-    let rows = read.sessions.iter().flat_map(|session| {
-        let zero = mean(&session.error_rad);
-        session.states(0.0).zip(&session.error_rad).map(move |([psi, torque, _], error)| [psi, torque, error - zero])
-    });
-    let count: usize = read.sessions.iter().map(Session::len).sum();
-    let rows: Vec<[f64; 3]> = rows.step_by(count.div_ceil(LOOKED_AT).max(1)).collect();
-    // Load, and waves of the output in either unit, as many as a table has, and of the generator in one.
-    let left = |unit: f64| {
-        let fit = Normal::of(22, rows.len(), |k, row| {
-            let [psi, torque, error] = rows[k];
-            let waves = [(psi / ratio, 6), (degree * psi / ratio, 2), (unit * psi, 2)].into_iter();
-            let orders = waves.flat_map(|(angle, most)| (1..=most).map(move |order| f64::from(order) * angle));
-            row[1] = torque;
-            let pairs = row[2..].chunks_exact_mut(2);
-            pairs.zip(orders).for_each(|(pair, angle)| (pair[0], pair[1]) = angle.sin_cos());
-            (error, 1.0)
-        });
-        fit.map(|fit| fit.misfit())
-    };
-    let Some((radians, degrees)) = left(1.0).zip(left(degree)).filter(|(rad, deg)| *deg < LEAVES * rad) else {
-        return Ok(());
-    };
-    let output = columns.column(Quantity::Output).0;
-    let rms = |squares: f64| (squares / rows.len() as f64).sqrt() * ARCSEC_PER_RAD;
-    let seen = format!(
-        "with load and waves of the output, waves of {generator} to 2 pi have a residual of {:.0} arcsec rms, to \
-         360 {:.0}",
-        rms(radians),
-        rms(degrees)
-    );
-    let why = "angles in degrees read as radians";
-    let readings = vec![
-        format!("--columns generator={generator}:deg,output={output}:deg"),
-        format!("--columns generator={generator}:rad,output={output}:rad if they are not"),
-    ];
-    Err(MeasuredError::of_file(&read.file, &Refusal::OtherReading { seen, why, readings }))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::synthesize::catalogue_drive;
+    use flexspline_base::units::ARCSEC_PER_RAD;
 
     /// A model shows that angles are in degrees, which is refused, and that a torque counts the other way, which is put
     /// right; without one neither shows.

@@ -38,7 +38,6 @@ pub(crate) mod select;
 mod tests;
 mod thinned;
 pub(crate) mod thresholds;
-mod torque_zero;
 pub mod trace;
 mod uncertainty;
 mod verdict;

@@ -18,7 +18,7 @@ use thiserror::Error;
 
 use super::report::{Cause, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose};
-use super::{channels, torque_zero, zeros};
+use super::{channels, zeros};
 use crate::calibrate::{CalibrationError, LEAST_GAIN, MOST_ERROR_RAD, Prior, calibrated_table, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
@@ -301,24 +301,14 @@ pub fn parse_rows(
         recording.notes.push(format!("the model holds {names} already; what is found is beyond that"));
     }
     let (nominal, table) = subject.against();
-    channels::check_degrees(&recording, columns, nominal, table)?;
+    channels::check_degrees(&recording, columns, nominal)?;
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
-    if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
-        recording.unusable = without_torque(&recording);
-    }
     // The zero is where the output changes its flank, if it is known how friction shifts that.
     if recording.unusable.is_none() && (table.is_some() || nominal.friction_torque_n_m > 0.0) {
-        torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
+        channels::check_zero(&mut recording, nominal, table);
     }
     recording.average_to(MOST_ROWS);
     Ok(recording)
-}
-
-/// Why nothing can be said of the unit where a torque was recorded and nearly all of it is lost.
-fn without_torque(recording: &Recording) -> Option<String> {
-    let gone = recording.sessions.iter().all(|session| session.torque_n_m.is_none());
-    let lost = |fault: &&Fault| fault.name == FaultName::FrozenChannel && fault.channel == Some(Quantity::Torque);
-    recording.faults.iter().filter(|_| gone).find(lost).map(|fault| fault.what.clone())
 }
 
 /// Diagnoses rows, and says what the core leaves of their error with tables of what was found.

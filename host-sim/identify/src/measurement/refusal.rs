@@ -30,12 +30,6 @@ pub(crate) enum Refusal {
     )]
     Milliseconds { column: String, rows: usize, period: f64, hours: f64, speed: f64 },
     #[error(
-        "the error follows the torque with {wind_up:.0} times the wind-up of the model, and clearance or waves are \
-         {other:.0} times the model's: angles in degrees (180/pi = 57.3) read as radians; allowed: --columns \
-         generator={generator}:deg,output={output}:deg, or generator={generator}:rad if they are not"
-    )]
-    BothInDegrees { wind_up: f64, other: f64, generator: String, output: String },
-    #[error(
         "{output} does not follow: {generator} turns by {turned:.3} rad, {output} by {followed:.6} rad; allowed: an \
          output that turns"
     )]
