@@ -3,7 +3,7 @@
 //! At this size the calls of a general library cost as much as the arithmetic; these loops are compiled for the vector
 //! unit that the machine has (pulp).
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Scalar, Simd, WithSimd};
 
 /// Kernels compiled for this machine.
 #[derive(Debug, Clone, Copy)]
@@ -111,20 +111,28 @@ macro_rules! kernel {
 pub(super) use kernel;
 
 kernel!(Eliminate { front: &'a mut [f64], m: usize, p: usize, sign: f64 } -> bool, |simd| {
+    let negate = |part: &mut [f64]| part.iter_mut().for_each(|x| *x = -*x);
     if sign < 0.0 {
-        for k in 0..p {
-            front[k * m + k..k * m + p].iter_mut().for_each(|x| *x = -*x);
-        }
+        (0..p).for_each(|k| negate(&mut front[k * m + k..k * m + p]));
+        negate(&mut front[p * m..m * m]);
     }
     // Rows from j on in whole vectors, which begin above the diagonal where need be: what lies there is never read.
     let above = |j: usize| m.checked_sub((m - j).next_multiple_of(8)).unwrap_or(j);
-    let mut k = 0;
-    while k < p {
-        let width = (p - k).min(4);
-        for c in k..k + width {
-            let (before, column) = front.split_at_mut(c * m);
-            for b in k..c {
-                let other = &before[b * m..(b + 1) * m];
+    for j in (0..p).step_by(4).chain((p..m).step_by(4)) {
+        let end = (j + 4).min(if j < p { p } else { m });
+        let (before, columns) = front.split_at_mut(j * m);
+        let columns = &mut columns[..(end - j) * m];
+        let solved = &before[..j.min(p) * m];
+        if end == j + 4 {
+            subtract_products::<S, 4>(simd, solved, columns, m, j, above(j));
+        } else {
+            for (column, j) in columns.chunks_exact_mut(m).zip(j..) {
+                subtract_products::<S, 1>(simd, solved, column, m, j, above(j));
+            }
+        }
+        for c in j..end.min(p) {
+            let (before, column) = columns.split_at_mut((c - j) * m);
+            for other in before.chunks_exact(m) {
                 subtract_sides(one_mut(&mut column[above(c)..m]), &other[above(c)..], [other[c]]);
             }
             let pivot = column[c];
@@ -134,20 +142,9 @@ kernel!(Eliminate { front: &'a mut [f64], m: usize, p: usize, sign: f64 } -> boo
             let scale = 1.0 / pivot.sqrt();
             column[above(c)..m].iter_mut().for_each(|x| *x *= scale);
         }
-        for j in k + width..m {
-            let s = if j < p { 1.0 } else { sign };
-            let (before, after) = front.split_at_mut(j * m);
-            let from = above(j);
-            let source = |i: usize| &before[(k + i) * m..(k + i + 1) * m];
-            let column = one_mut(&mut after[from..m]);
-            if width == 4 {
-                let sources = [0, 1, 2, 3].map(source);
-                subtract_four(simd, column, sources.map(|a| &a[from..]), sources.map(|a| [s * a[j]]));
-            } else {
-                (0..width).map(source).for_each(|a| subtract_sides(column, &a[from..], [s * a[j]]));
-            }
-        }
-        k += width;
+    }
+    if sign < 0.0 {
+        negate(&mut front[p * m..m * m]);
     }
     true
 });
@@ -196,6 +193,57 @@ kernel!(MultiplyTransposed<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &
         }
     }
 });
+
+/// Takes `sum_k solved_k solved_k[j + q]` from column q of Q, rows from `row` on; all columns have m rows.
+#[inline(always)]
+fn subtract_products<S: Simd, const Q: usize>(
+    simd: S,
+    solved: &[f64],
+    columns: &mut [f64],
+    m: usize,
+    j: usize,
+    mut row: usize,
+) {
+    while row + 2 * S::F64_LANES <= m {
+        subtract_tile::<S, Q, 2>(simd, solved, columns, m, [row, j]);
+        row += 2 * S::F64_LANES;
+    }
+    while row + S::F64_LANES <= m {
+        subtract_tile::<S, Q, 1>(simd, solved, columns, m, [row, j]);
+        row += S::F64_LANES;
+    }
+    for row in row..m {
+        subtract_tile::<Scalar, Q, 1>(Scalar::new(), solved, columns, m, [row, j]);
+    }
+}
+
+/// The same for as many rows as V vectors have, which stay in registers.
+#[inline(always)]
+fn subtract_tile<S: Simd, const Q: usize, const V: usize>(
+    simd: S,
+    solved: &[f64],
+    columns: &mut [f64],
+    m: usize,
+    [row, j]: [usize; 2],
+) {
+    let rows = row..row + V * S::F64_LANES;
+    let mut sums = [[simd.splat_f64s(0.0); V]; Q];
+    for (sums, column) in sums.iter_mut().zip(columns.chunks_exact(m)) {
+        sums.copy_from_slice(S::as_simd_f64s(&column[rows.clone()]).0);
+    }
+    for source in solved.chunks_exact(m) {
+        let at = S::as_simd_f64s(&source[rows.clone()]).0;
+        for (sums, by) in sums.iter_mut().zip(&source[j..j + Q]) {
+            let by = simd.splat_f64s(-by);
+            for (sum, at) in sums.iter_mut().zip(at) {
+                *sum = simd.mul_add_f64s(*at, by, *sum);
+            }
+        }
+    }
+    for (sums, column) in sums.iter().zip(columns.chunks_exact_mut(m)) {
+        S::as_mut_simd_f64s(&mut column[rows.clone()]).0.copy_from_slice(sums);
+    }
+}
 
 /// `y -= sign A x` for the rows of a column-major matrix (m rows) from `first` on, four columns at a time: what is
 /// read and written of y serves them all.
