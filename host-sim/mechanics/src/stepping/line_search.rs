@@ -3,7 +3,8 @@
 use super::continuation::ContactStage;
 use super::convergence::Convergence;
 use super::problem::Problem;
-use super::step::{NewtonStep, Unbalance};
+use super::slip::NodalField;
+use super::step::Unbalance;
 
 /// Share of the force along a step that may act back at its end. Where contact opens and closes with each step,
 /// iterations that give back nearly all they took go round in a circle: after this number they may give back less.
@@ -71,7 +72,7 @@ impl LineSearch {
     }
 
     /// Begins with a step. The force along it falls to nothing at the end of a perfect one; far beyond, halve it.
-    pub fn begin(&mut self, step: &NewtonStep, residual: &Unbalance, convergence: &Convergence) {
+    pub fn begin(&mut self, step: &NodalField, residual: &Unbalance, convergence: &Convergence) {
         self.before = step.work(residual);
         let goes_round = convergence.history.len() > GOES_ROUND_AFTER;
         self.least = -(if goes_round { RETURNS_LITTLE } else { RETURNS }) * self.before;
@@ -80,7 +81,7 @@ impl LineSearch {
     }
 
     /// Verdict on the step by the residual at its end.
-    pub(crate) fn judge(&mut self, trial: usize, step: &NewtonStep, residual: &Unbalance) -> Trial {
+    pub(crate) fn judge(&mut self, trial: usize, step: &NodalField, residual: &Unbalance) -> Trial {
         let overshoot = self.before > 0.0 && step.work(residual) < self.least;
         if !overshoot || self.near_round_off || trial == MOST_TRIALS {
             self.last_length = self.length;

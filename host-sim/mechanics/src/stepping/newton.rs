@@ -29,7 +29,7 @@ use super::problem::Problem;
 use super::reference::SparseWheels;
 use super::slip::{NodalField, Slipping};
 use super::state::State;
-use super::step::{ANCHORED, BORDERS, LATERAL, NewtonStep, OUTPUT, SLEEVE, Unbalance, improve};
+use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, SLEEVE, Unbalance, improve};
 use super::wheels::Wheels;
 
 /// Pairs closer than this (mm) get a place in the sparsity pattern.
@@ -308,7 +308,7 @@ impl<'p> Solver<'p> {
         self.balance_output(&mut state, sought, &mut near);
         let mut residual = self.assemble(&mut state, sought, &mut near);
         let mut held = false;
-        let mut chords: Vec<NewtonStep> = Vec::new();
+        let mut chords: Vec<NodalField> = Vec::new();
         let mut search = LineSearch::new(self.problem, stage);
         let steady = stage.softening.is_none() && self.passed.go_on(guess, torque_n_m);
         search.recalled = steady && generator_rad != guess.generator_rad && self.recall(generator_rad);
@@ -360,7 +360,7 @@ impl<'p> Solver<'p> {
     /// was mistaken.
     fn go_along(
         &mut self,
-        step: &NewtonStep,
+        step: &NodalField,
         state: &mut State,
         sought: Sought<'_>,
         near: &mut NearPairs,
@@ -374,7 +374,7 @@ impl<'p> Solver<'p> {
             if near.must_search() {
                 self.wheels.complete(state);
             }
-            let mut candidate = step.applied_to(state, search.length);
+            let mut candidate = step.applied_to(state, search.length, &self.problem.held);
             self.wheels.follow(&mut candidate);
             let residual = self.assemble(&mut candidate, sought, near);
             match search.judge(trial, step, &residual) {
@@ -443,9 +443,10 @@ impl<'p> Solver<'p> {
 
     /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to
     /// 1.25 (the Lebesgue constant of a quadratic).
-    fn motion(&self, step: &NewtonStep) -> f64 {
+    fn motion(&self, step: &NodalField) -> f64 {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let nodes = largest(&step.u) + largest(&step.v);
+        let (u, v) = step.free.split_at(2 * self.problem.wheels().0.nodes.len());
+        let nodes = largest(u) + largest(v);
         (1.25 + self.leans_within) * std::f64::consts::SQRT_2 * nodes
             + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
     }
@@ -617,7 +618,7 @@ impl<'p> Solver<'p> {
     /// One Newton step, or nothing when the tangent is not positive definite.
     ///
     /// With `chord` the last tangent serves again.
-    fn solve(&mut self, residual: &Unbalance, chord: bool) -> Option<NewtonStep> {
+    fn solve(&mut self, residual: &Unbalance, chord: bool) -> Option<NodalField> {
         // Displacements by the forces without the border, solved together with the border of a new factor.
         let mut begun = None;
         if !chord || self.eliminated.is_none() {
@@ -637,17 +638,7 @@ impl<'p> Solver<'p> {
         let forces = NodalField { free: residual.force.clone(), border: residual.border };
         let solved = slipping.solve(forces, |field| self.solve_symmetric(field, begun.take()));
         self.slipping = slipping;
-        let NodalField { free, border } = solved?;
-        let (fs, _) = self.problem.wheels();
-        let u = free[..2 * fs.nodes.len()].to_vec();
-        let mut v = vec![0.0; 2 * self.cs_index.len()];
-        for (n, index) in self.cs_index.iter().enumerate() {
-            if let Some(free_node) = index {
-                v[2 * n] = free[2 * *free_node as usize];
-                v[2 * n + 1] = free[2 * *free_node as usize + 1];
-            }
-        }
-        Some(NewtonStep { free, u, v, border })
+        solved
     }
 
     /// Solves with the last factor, in place; `begun` is what that factor did with the forces when it was made.

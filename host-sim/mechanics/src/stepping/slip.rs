@@ -87,12 +87,12 @@ impl Slipping {
     }
 
     /// The step for the forces `r`, where `solve` solves with K in place; nothing where it cannot.
-    pub fn solve(&self, r: NodalField, mut solve: impl FnMut(&mut NodalField) -> Option<()>) -> Option<NodalField> {
+    pub fn solve(&self, mut r: NodalField, mut solve: impl FnMut(&mut NodalField) -> Option<()>) -> Option<NodalField> {
+        if self.is_empty() {
+            return solve(&mut r).map(|()| r);
+        }
         let mut x = r.clone();
         solve(&mut x)?;
-        if self.is_empty() {
-            return Some(x);
-        }
         let none = NodalField { free: vec![0.0; r.free.len()], border: [0.0; BORDERS] };
         let mut possible = true;
         let y = gmres(&self.gaps(&x), |y| {

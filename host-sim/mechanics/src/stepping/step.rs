@@ -2,6 +2,7 @@
 
 use crate::fem::dot;
 
+use super::slip::NodalField;
 use super::state::State;
 use super::waves::MOST_WAVES;
 
@@ -72,32 +73,23 @@ impl Unbalance {
     }
 }
 
-/// A Newton step in all unknowns.
-pub(super) struct NewtonStep {
-    pub free: Vec<f64>,
-    pub u: Vec<f64>,
-    pub v: Vec<f64>,
-    pub border: [f64; BORDERS],
-}
-
-impl NewtonStep {
+/// A Newton step.
+impl NodalField {
     /// Work of the out-of-balance forces along the step.
     pub(crate) fn work(&self, residual: &Unbalance) -> f64 {
         dot(&residual.force, &self.free) + residual.border[OUTPUT] * self.border[OUTPUT]
     }
 
-    /// Scalar product of displacements (mm²), the turn of the output counted at a radius.
-    fn dot(&self, other: &NewtonStep) -> f64 {
+    /// How much of this step another has in it, by displacements, the turn of the output counted at a radius.
+    fn share_in(&self, other: &NodalField) -> f64 {
         const RADIUS: f64 = 50.0;
-        dot(&self.free, &other.free) + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
-    }
-
-    fn add(&mut self, factor: f64, other: &NewtonStep) {
-        let add = |x: &mut [f64], y: &[f64]| x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
-        add(&mut self.free, &other.free);
-        add(&mut self.u, &other.u);
-        add(&mut self.v, &other.v);
-        add(&mut self.border, &other.border);
+        let turns = |step: &NodalField| RADIUS * RADIUS * self.border[OUTPUT] * step.border[OUTPUT];
+        let (mut along, mut square) = (0.0, 0.0);
+        for (x, y) in self.free.iter().zip(&other.free) {
+            along += x * y;
+            square += x * x;
+        }
+        (along + turns(other)) / (square + turns(self))
     }
 
     /// Largest displacement, mm.
@@ -105,10 +97,16 @@ impl NewtonStep {
         self.free.iter().fold(1e-30, |m, x| x.abs().max(m))
     }
 
-    pub(crate) fn applied_to(&self, state: &State, length: f64) -> State {
+    /// A state further along by a share of the step; nodes of the circular spline that are `held` stay.
+    pub(crate) fn applied_to(&self, state: &State, length: f64, held: &[bool]) -> State {
         let mut next = state.clone();
-        next.u.iter_mut().zip(&self.u).for_each(|(x, d)| *x += length * d);
-        next.v.iter_mut().zip(&self.v).for_each(|(x, d)| *x += length * d);
+        let (u, v) = self.free.split_at(next.u.len());
+        next.u.iter_mut().zip(u).for_each(|(x, d)| *x += length * d);
+        let nodes = next.v.as_chunks_mut::<2>().0.iter_mut().zip(held).filter(|(_, held)| !**held);
+        for ([x, y], d) in nodes.map(|(node, _)| node).zip(v.as_chunks::<2>().0) {
+            *x += length * d[0];
+            *y += length * d[1];
+        }
         next.output_rad += length * self.border[OUTPUT];
         next.sleeve_moment += length * self.border[SLEEVE];
         next.lateral_force[0] += length * self.border[LATERAL];
@@ -119,18 +117,18 @@ impl NewtonStep {
 
 /// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and
 /// Nonlinear Equations, 1995, section 7.3): `step` is the old tangent's.
-pub(super) fn improve(step: &mut NewtonStep, taken: &[NewtonStep]) {
+pub(super) fn improve(step: &mut NodalField, taken: &[NodalField]) {
     for pair in taken.windows(2) {
-        let part = pair[0].dot(step) / pair[0].dot(&pair[0]);
-        step.add(part, &pair[1]);
+        let part = pair[0].share_in(step);
+        step.free.iter_mut().zip(&pair[1].free).for_each(|(x, y)| *x += part * y);
+        step.border.iter_mut().zip(&pair[1].border).for_each(|(x, y)| *x += part * y);
     }
     if let Some(last) = taken.last() {
-        let part = last.dot(step) / last.dot(last);
+        let part = last.share_in(step);
         // Beyond this the secant says more about the contact than about the tangent.
         if part.abs() < 0.5 {
             let more = part / (1.0 - part);
-            let own = NewtonStep { free: step.free.clone(), u: step.u.clone(), v: step.v.clone(), border: step.border };
-            step.add(more, &own);
+            step.free.iter_mut().chain(&mut step.border).for_each(|x| *x += more * *x);
         }
     }
 }
