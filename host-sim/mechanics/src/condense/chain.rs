@@ -28,8 +28,6 @@ pub struct Contribution {
     pub blocks: Vec<u32>,
     /// Symmetric matrix, column-major; only the lower triangle is read.
     pub matrix: Vec<f64>,
-    /// Rows and columns of it that come before those of the blocks.
-    pub before: usize,
 }
 
 /// An eliminated block.
@@ -77,23 +75,26 @@ impl Chain {
         for (r, &b) in order.iter().enumerate() {
             rank[b as usize] = r as u32;
         }
-        // Contributions wait at the first of their blocks; so do the updates that eliminated blocks leave behind.
-        let mut waiting: Vec<Vec<u32>> = vec![Vec::new(); blocks.len()];
-        for (c, contribution) in contributions.iter().enumerate() {
-            if let Some(first) = contribution.blocks.iter().min_by_key(|b| rank[**b as usize]) {
-                waiting[*first as usize].push(c as u32);
-            }
-        }
-        let mut updates: Vec<Contribution> = Vec::new();
-        let mut updates_at: Vec<Vec<u32>> = vec![Vec::new(); blocks.len()];
+        // Contributions wait at the first of their blocks; so do the updates that eliminated blocks leave behind, each
+        // what is left of a front.
+        let first = |contribution: &Contribution| contribution.blocks.iter().map(|b| rank[*b as usize]).min();
+        let mut waiting: Vec<(u32, &Contribution)> =
+            contributions.iter().filter_map(|contribution| Some((first(contribution)?, contribution))).collect();
+        waiting.sort_by_key(|(first, _)| *first);
+        let mut waiting = waiting.into_iter().peekable();
+        let mut updates: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut offset = vec![0_usize; blocks.len()];
+        let mut sources: Vec<&Contribution> = Vec::new();
         for &block in &order {
-            let sources = waiting[block as usize]
-                .iter()
-                .map(|c| &contributions[*c as usize])
-                .chain(updates_at[block as usize].iter().map(|u| &updates[*u as usize]));
-            let mut members: Vec<u32> = sources.clone().flat_map(|s| s.blocks.iter().copied()).collect();
-            members.push(block);
+            sources.clear();
+            while let Some((_, contribution)) = waiting.next_if(|(first, _)| *first == rank[block as usize]) {
+                sources.push(contribution);
+            }
+            let of_block = |(panel, _): &mut (usize, Vec<f64>)| self.panels[*panel].later[0] == block;
+            let updates_here: Vec<(usize, Vec<f64>)> = updates.extract_if(.., of_block).collect();
+            let mut members = vec![block];
+            sources.iter().for_each(|source| members.extend(&source.blocks));
+            updates_here.iter().for_each(|(panel, _)| members.extend(&self.panels[*panel].later));
             members.sort_unstable_by_key(|b| rank[*b as usize]);
             members.dedup();
             let mut m = 0;
@@ -104,8 +105,14 @@ impl Chain {
             let mut front = self.spare.pop().unwrap_or_default();
             front.clear();
             front.resize(m * m, 0.0);
-            for source in sources {
-                self.kernels.0.dispatch(AddBlocks { front: &mut front, m, source, blocks, offset: &offset });
+            let whole = sources.iter().map(|source| (&source.blocks, &source.matrix, 0));
+            let left = updates_here.iter().map(|(panel, matrix)| {
+                let Panel { later, size, .. } = &self.panels[*panel];
+                (later, matrix, *size)
+            });
+            for (of, matrix, before) in whole.chain(left) {
+                let add = AddBlocks { front: &mut front, m, of, matrix, before, blocks, offset: &offset };
+                self.kernels.0.dispatch(add);
             }
             let ChainBlock { size, sign, .. } = blocks[block as usize];
             if !self.kernels.eliminate(&mut front, m, size, sign) {
@@ -113,15 +120,12 @@ impl Chain {
             }
             let start = self.values.len();
             self.values.extend_from_slice(&front[..m * size]);
-            let later = members.split_off(1);
-            for u in std::mem::take(&mut updates_at[block as usize]) {
-                self.spare.push(std::mem::take(&mut updates[u as usize].matrix));
+            self.spare.extend(updates_here.into_iter().map(|(_, matrix)| matrix));
+            members.remove(0);
+            if !members.is_empty() {
+                updates.push((self.panels.len(), front));
             }
-            if let Some(&next) = later.first() {
-                updates_at[next as usize].push(updates.len() as u32);
-                updates.push(Contribution { blocks: later.clone(), matrix: front, before: size });
-            }
-            self.panels.push(Panel { block, size, sign, order: m, later, start });
+            self.panels.push(Panel { block, size, sign, order: m, later: members, start });
         }
         true
     }
@@ -165,20 +169,21 @@ impl Chain {
     }
 }
 
-// Adds the lower triangle of a matrix over blocks to that of a front.
+// Adds the lower triangle of a matrix over blocks, `before` rows and columns of it left out, to that of a front.
 kernel!(AddBlocks {
-    front: &'a mut [f64], m: usize, source: &'a Contribution, blocks: &'a [ChainBlock], offset: &'a [usize]
+    front: &'a mut [f64], m: usize, of: &'a [u32], matrix: &'a [f64], before: usize, blocks: &'a [ChainBlock],
+    offset: &'a [usize]
 } -> (), |_simd| {
-    let stride = source.before + source.blocks.iter().map(|b| blocks[*b as usize].size).sum::<usize>();
-    let mut column = source.before;
-    for (jb, &b) in source.blocks.iter().enumerate() {
+    let stride = before + of.iter().map(|b| blocks[*b as usize].size).sum::<usize>();
+    let mut column = before;
+    for (jb, &b) in of.iter().enumerate() {
         let (to, size) = (offset[b as usize], blocks[b as usize].size);
         for j in 0..size {
-            let values = &source.matrix[(column + j) * stride..];
+            let values = &matrix[(column + j) * stride..];
             let own = &mut front[(to + j) * (m + 1)..][..size - j];
             subtract_sides(one_mut(own), &values[column + j..][..size - j], [-1.0]);
             let mut row = column + size;
-            for &a in &source.blocks[jb + 1..] {
+            for &a in &of[jb + 1..] {
                 let (from, size) = (offset[a as usize], blocks[a as usize].size);
                 let values = &values[row..row + size];
                 if from > to {
@@ -227,7 +232,7 @@ mod tests {
                         matrix[i + j * n] = if i == j { 9.0 * signs[i] } else { rng.f64() - 0.5 };
                     }
                 }
-                Contribution { blocks: members, matrix, before: 0 }
+                Contribution { blocks: members, matrix }
             })
             .collect();
         let mut chain = Chain::default();

@@ -195,6 +195,8 @@ pub(super) struct CondensedWheels<'p> {
     factor: Kept,
     /// Work space of a factorisation.
     contributions: Vec<Contribution>,
+    /// Work space of a solution.
+    kept: Vec<f64>,
     /// Pitches by which the state is turned against the one that the factor was made for.
     turned: isize,
 }
@@ -217,6 +219,7 @@ impl<'p> CondensedWheels<'p> {
             flanks: Vec::new(),
             factor: Rc::default(),
             contributions: Vec::new(),
+            kept: Vec::new(),
             turned: 0,
         }
     }
@@ -418,24 +421,31 @@ fn low_rank(stiffness: &[f64]) -> (usize, Vec<f64>) {
 impl Factor for CondensedWheels<'_> {
     fn solve(&mut self, columns: &mut [f64], count: usize) {
         match count {
-            1 => self.solve_sides::<1>(columns),
-            2..=4 => self.solve_sides::<4>(columns),
-            _ => self.solve_sides::<8>(columns),
+            1 => self.solve_sides(one_mut(columns)),
+            2..=4 => self.solve_beside::<4>(columns),
+            _ => self.solve_beside::<8>(columns),
         }
     }
 }
 
 impl CondensedWheels<'_> {
-    /// Solves in place for at most W right-hand sides, which lie one after the other in `columns`; within they lie
-    /// beside one another.
-    fn solve_sides<const W: usize>(&mut self, columns: &mut [f64]) {
+    /// Solves in place for at most W right-hand sides, which lie one after the other in `columns`.
+    fn solve_beside<const W: usize>(&mut self, columns: &mut [f64]) {
         let n = self.unknowns();
         let mut x = vec![[0.0; W]; n];
         for (w, column) in columns.chunks_exact(n).enumerate() {
             x.iter_mut().zip(column).for_each(|(x, value)| x[w] = *value);
         }
+        self.solve_sides(&mut x);
+        for (w, column) in columns.chunks_exact_mut(n).enumerate() {
+            x.iter().zip(column).for_each(|(x, value)| *value = x[w]);
+        }
+    }
+
+    /// Solves in place for W right-hand sides that lie beside one another.
+    fn solve_sides<const W: usize>(&mut self, x: &mut [[f64; W]]) {
         self.solved.clone_from(&self.live);
-        let CondensedWheels { model, kernels, factor, live, turned, .. } = self;
+        let CondensedWheels { model, kernels, factor, live, turned, kept, .. } = self;
         let factor = factor.as_ref();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
         // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
@@ -447,11 +457,12 @@ impl CondensedWheels<'_> {
             .map(|(cell, unknowns)| CellAt { kernels: *kernels, cell, unknowns, order: &factor.chain })
             .collect();
         let mut chain = vec![[0.0; W]; factor.chain.unknowns()];
-        let mut kept = vec![[0.0; W]; cells.iter().map(CellAt::kept).sum()];
-        let mut left = kept.as_mut_slice();
+        let each: usize = cells.iter().map(CellAt::kept).sum();
+        kept.resize(kept.len().max(W * each), 0.0);
+        let mut left = &mut kept.as_chunks_mut().0[..];
         for (at, tangent) in cells.iter().zip(&factor.cells) {
             let (own, others) = left.split_at_mut(at.kept());
-            tangent.forward(*at, &x, &mut chain, own);
+            tangent.forward(*at, x, &mut chain, own);
             left = others;
         }
         for face in &model.faces {
@@ -463,19 +474,16 @@ impl CondensedWheels<'_> {
             }
         }
         factor.chain.solve(&mut chain);
-        let mut left = kept.as_mut_slice();
+        let mut left = &mut kept.as_chunks_mut().0[..];
         for (at, tangent) in cells.iter().zip(&factor.cells) {
             let (own, others) = left.split_at_mut(at.kept());
-            tangent.backward(*at, &mut x, &chain, own);
+            tangent.backward(*at, x, &chain, own);
             left = others;
         }
         for face in &model.faces {
             let own = &mut x[face.unknowns.clone()];
             own.copy_from_slice(&chain[factor.chain.offset(face.block)..][..own.len()]);
             rotate_sides(own, face.turn);
-        }
-        for (w, column) in columns.chunks_exact_mut(n).enumerate() {
-            x.iter().zip(column).for_each(|(x, value)| *value = x[w]);
         }
     }
 }
@@ -584,7 +592,7 @@ impl Wheels for CondensedWheels<'_> {
                     matrix[n + 1] += ANCHOR;
                 }
                 if diagonal != 0.0 || k == 0 {
-                    contributions.push(Contribution { blocks: vec![k as u32], matrix, before: 0 });
+                    contributions.push(Contribution { blocks: vec![k as u32], matrix });
                 }
             }
             definite = factor.chain.factorise(&blocks, &contributions);
