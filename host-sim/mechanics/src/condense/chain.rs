@@ -21,15 +21,6 @@ pub struct ChainBlock {
     pub key: f64,
 }
 
-/// A dense contribution over a few blocks.
-#[derive(Debug, Clone, Default)]
-pub struct Contribution {
-    /// Its blocks.
-    pub blocks: Vec<u32>,
-    /// Symmetric matrix, column-major; only the lower triangle is read.
-    pub matrix: Vec<f64>,
-}
-
 /// An eliminated block.
 #[derive(Debug, Clone)]
 struct Panel {
@@ -58,9 +49,16 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Factorises the sum of the contributions; false when a block has not its sign.
+    /// Factorises the sum of contributions over these blocks each; false when a block has not its sign. Each is asked
+    /// for when the first of its blocks is eliminated, and gives its symmetric matrix, column-major, of which the lower
+    /// triangle is read, or is refused.
     #[must_use]
-    pub fn factorise(&mut self, blocks: &[ChainBlock], contributions: &[Contribution]) -> bool {
+    pub fn factorise(
+        &mut self,
+        blocks: &[ChainBlock],
+        contributions: &[Vec<u32>],
+        mut matrix_of: impl FnMut(usize, &mut dyn FnMut(&[f64])) -> bool,
+    ) -> bool {
         self.panels.clear();
         self.values.clear();
         self.offsets.clear();
@@ -77,23 +75,21 @@ impl Chain {
         }
         // Contributions wait at the first of their blocks; so do the updates that eliminated blocks leave behind, each
         // what is left of a front.
-        let first = |contribution: &Contribution| contribution.blocks.iter().map(|b| rank[*b as usize]).min();
-        let mut waiting: Vec<(u32, &Contribution)> =
-            contributions.iter().filter_map(|contribution| Some((first(contribution)?, contribution))).collect();
-        waiting.sort_by_key(|(first, _)| *first);
-        let mut waiting = waiting.into_iter().peekable();
+        let first = |of: &Vec<u32>| of.iter().map(|b| rank[*b as usize]).min();
+        let mut waiting: Vec<(u32, usize)> =
+            contributions.iter().enumerate().filter_map(|(c, of)| Some((first(of)?, c))).collect();
+        waiting.sort_unstable();
+        let mut waiting = waiting.as_slice();
         let mut updates: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut offset = vec![0_usize; blocks.len()];
-        let mut sources: Vec<&Contribution> = Vec::new();
         for &block in &order {
-            sources.clear();
-            while let Some((_, contribution)) = waiting.next_if(|(first, _)| *first == rank[block as usize]) {
-                sources.push(contribution);
-            }
+            let (sources, later) =
+                waiting.split_at(waiting.partition_point(|(first, _)| *first <= rank[block as usize]));
+            waiting = later;
             let of_block = |(panel, _): &mut (usize, Vec<f64>)| self.panels[*panel].later[0] == block;
             let updates_here: Vec<(usize, Vec<f64>)> = updates.extract_if(.., of_block).collect();
             let mut members = vec![block];
-            sources.iter().for_each(|source| members.extend(&source.blocks));
+            sources.iter().for_each(|(_, c)| members.extend(&contributions[*c]));
             updates_here.iter().for_each(|(panel, _)| members.extend(&self.panels[*panel].later));
             members.sort_unstable_by_key(|b| rank[*b as usize]);
             members.dedup();
@@ -105,14 +101,16 @@ impl Chain {
             let mut front = self.spare.pop().unwrap_or_default();
             front.clear();
             front.resize(m * m, 0.0);
-            let whole = sources.iter().map(|source| (&source.blocks, &source.matrix, 0));
-            let left = updates_here.iter().map(|(panel, matrix)| {
-                let Panel { later, size, .. } = &self.panels[*panel];
-                (later, matrix, *size)
-            });
-            for (of, matrix, before) in whole.chain(left) {
+            let mut add = |of: &[u32], matrix: &[f64], before: usize| {
                 let add = AddBlocks { front: &mut front, m, of, matrix, before, blocks, offset: &offset };
                 self.kernels.0.dispatch(add);
+            };
+            if !sources.iter().all(|(_, c)| matrix_of(*c, &mut |matrix| add(&contributions[*c], matrix, 0))) {
+                return false;
+            }
+            for (panel, matrix) in &updates_here {
+                let Panel { later, size, .. } = &self.panels[*panel];
+                add(later, matrix, *size);
             }
             let ChainBlock { size, sign, .. } = blocks[block as usize];
             if !self.kernels.eliminate(&mut front, m, size, sign) {
@@ -218,7 +216,7 @@ mod tests {
             })
             .collect();
         let mut rng = fastrand::Rng::with_seed(3);
-        let contributions: Vec<Contribution> = (0..count)
+        let contributions: Vec<(Vec<u32>, Vec<f64>)> = (0..count)
             .map(|k| {
                 let members: Vec<u32> = [k, (k + 2) % count, (k + 1) % count].iter().map(|b| *b as u32).collect();
                 let n: usize = members.iter().map(|b| sizes[*b as usize]).sum();
@@ -232,22 +230,27 @@ mod tests {
                         matrix[i + j * n] = if i == j { 9.0 * signs[i] } else { rng.f64() - 0.5 };
                     }
                 }
-                Contribution { blocks: members, matrix }
+                (members, matrix)
             })
             .collect();
         let mut chain = Chain::default();
-        assert!(chain.factorise(&blocks, &contributions));
+        let (over, matrices): (Vec<_>, Vec<_>) = contributions.into_iter().unzip();
+        let give = |c: usize, add: &mut dyn FnMut(&[f64])| {
+            add(&matrices[c]);
+            true
+        };
+        assert!(chain.factorise(&blocks, &over, give));
         let b: Vec<f64> = (0..chain.unknowns()).map(|i| (i as f64 * 1.7).sin()).collect();
         let mut x = b.clone();
         chain.solve(one_mut(&mut x));
         let mut residual: Vec<f64> = b.iter().map(|b| -b).collect();
-        for c in &contributions {
+        for (of, matrix) in over.iter().zip(&matrices) {
             let index: Vec<usize> =
-                c.blocks.iter().flat_map(|b| (0..sizes[*b as usize]).map(|i| chain.offset(*b as usize) + i)).collect();
+                of.iter().flat_map(|b| (0..sizes[*b as usize]).map(|i| chain.offset(*b as usize) + i)).collect();
             let n = index.len();
             for j in 0..n {
                 for i in j..n {
-                    let a = c.matrix[i + j * n];
+                    let a = matrix[i + j * n];
                     residual[index[i]] += a * x[index[j]];
                     if i != j {
                         residual[index[j]] += a * x[index[i]];

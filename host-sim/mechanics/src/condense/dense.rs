@@ -124,10 +124,10 @@ kernel!(Eliminate { front: &'a mut [f64], m: usize, p: usize, sign: f64 } -> boo
         let columns = &mut columns[..(end - j) * m];
         let solved = &before[..j.min(p) * m];
         if end == j + 4 {
-            subtract_products::<S, 4>(simd, solved, columns, m, j, above(j));
+            subtract_products::<S, 4>(simd, solved, columns, m, [j, above(j)]);
         } else {
             for (column, j) in columns.chunks_exact_mut(m).zip(j..) {
-                subtract_products::<S, 1>(simd, solved, column, m, j, above(j));
+                subtract_products::<S, 1>(simd, solved, column, m, [j, above(j)]);
             }
         }
         for c in j..end.min(p) {
@@ -196,53 +196,40 @@ kernel!(MultiplyTransposed<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &
 
 /// Takes `sum_k solved_k solved_k[j + q]` from column q of Q, rows from `row` on; all columns have m rows.
 #[inline(always)]
-fn subtract_products<S: Simd, const Q: usize>(
-    simd: S,
-    solved: &[f64],
-    columns: &mut [f64],
-    m: usize,
-    j: usize,
-    mut row: usize,
-) {
-    while row + 2 * S::F64_LANES <= m {
-        subtract_tile::<S, Q, 2>(simd, solved, columns, m, [row, j]);
-        row += 2 * S::F64_LANES;
-    }
-    while row + S::F64_LANES <= m {
-        subtract_tile::<S, Q, 1>(simd, solved, columns, m, [row, j]);
-        row += S::F64_LANES;
-    }
-    for row in row..m {
-        subtract_tile::<Scalar, Q, 1>(Scalar::new(), solved, columns, m, [row, j]);
-    }
+fn subtract_products<S: Simd, const Q: usize>(simd: S, solved: &[f64], columns: &mut [f64], m: usize, at: [usize; 2]) {
+    let at = subtract_tiles::<S, Q, 2>(simd, solved, columns, m, at);
+    let at = subtract_tiles::<S, Q, 1>(simd, solved, columns, m, at);
+    subtract_tiles::<Scalar, Q, 1>(Scalar::new(), solved, columns, m, at);
 }
 
-/// The same for as many rows as V vectors have, which stay in registers.
+/// The same for as many rows at a time as V vectors have, which stay in registers; where it ends.
 #[inline(always)]
-fn subtract_tile<S: Simd, const Q: usize, const V: usize>(
+fn subtract_tiles<S: Simd, const Q: usize, const V: usize>(
     simd: S,
     solved: &[f64],
     columns: &mut [f64],
     m: usize,
-    [row, j]: [usize; 2],
-) {
-    let rows = row..row + V * S::F64_LANES;
-    let mut sums = [[simd.splat_f64s(0.0); V]; Q];
-    for (sums, column) in sums.iter_mut().zip(columns.chunks_exact(m)) {
-        sums.copy_from_slice(S::as_simd_f64s(&column[rows.clone()]).0);
-    }
-    for source in solved.chunks_exact(m) {
-        let at = S::as_simd_f64s(&source[rows.clone()]).0;
-        for (sums, by) in sums.iter_mut().zip(&source[j..j + Q]) {
-            let by = simd.splat_f64s(-by);
-            for (sum, at) in sums.iter_mut().zip(at) {
-                *sum = simd.mul_add_f64s(*at, by, *sum);
+    [j, mut row]: [usize; 2],
+) -> [usize; 2] {
+    while row + V * S::F64_LANES <= m {
+        let rows = row..row + V * S::F64_LANES;
+        let mut sums = [[simd.splat_f64s(0.0); V]; Q];
+        for (sums, column) in sums.iter_mut().zip(columns.chunks_exact(m)) {
+            sums.copy_from_slice(S::as_simd_f64s(&column[rows.clone()]).0);
+        }
+        for source in solved.chunks_exact(m) {
+            let values = S::as_simd_f64s(&source[rows.clone()]).0;
+            for (sums, by) in sums.iter_mut().zip(&source[j..j + Q]) {
+                let by = simd.splat_f64s(-by);
+                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum = simd.mul_add_f64s(*value, by, *sum));
             }
         }
+        for (sums, column) in sums.iter().zip(columns.chunks_exact_mut(m)) {
+            S::as_mut_simd_f64s(&mut column[rows.clone()]).0.copy_from_slice(sums);
+        }
+        row = rows.end;
     }
-    for (sums, column) in sums.iter().zip(columns.chunks_exact_mut(m)) {
-        S::as_mut_simd_f64s(&mut column[rows.clone()]).0.copy_from_slice(sums);
-    }
+    [j, row]
 }
 
 /// `y -= sign A x` for the rows of a column-major matrix (m rows) from `first` on, four columns at a time: what is

@@ -14,7 +14,7 @@ mod skin;
 mod superelement;
 mod tangent;
 
-pub use chain::{Chain, ChainBlock, Contribution};
+pub use chain::{Chain, ChainBlock};
 pub use corotation::{CellState, CoRotation};
 pub use dense::{DenseKernels, one, one_mut};
 pub use model::{Cell, CondensedWheel};

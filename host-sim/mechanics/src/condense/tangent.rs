@@ -16,12 +16,10 @@
 //! get `g_i a^T + a g_i^T + c a a^T` and their coupling with the tractions `g_t a^T`. This is exact, because a is zero
 //! on what was eliminated.
 
-use pulp::{Simd, WithSimd};
-
 use crate::mesh::rotate;
 
-use super::chain::{Chain, Contribution};
-use super::dense::{DenseKernels, kernel, one, one_mut};
+use super::chain::Chain;
+use super::dense::{DenseKernels, one, one_mut};
 use super::model::Cell;
 
 /// Contact of a pair of flanks as this cell sees it: columns of G on its flank nodes, in its frame.
@@ -124,12 +122,105 @@ impl CellTangent {
         &mut self,
         kernels: DenseKernels,
         cell: &Cell,
-        placed: (CellPlacement, Vec<Traction>),
+        (place, tractions): (CellPlacement, Vec<Traction>),
         geometric: Option<Geometric>,
         touched: Option<&mut [f64]>,
-        contribution: &mut Contribution,
+        matrix: &mut Vec<f64>,
     ) -> bool {
-        kernels.0.dispatch(Reduce { tangent: self, kernels, cell, placed, geometric, touched, contribution })
+        let (f, b, i) = (cell.flank(), cell.bore(), 2 * cell.face());
+        let r = b + i;
+        self.place = place;
+        self.tractions = tractions;
+
+        // Bore and faces.
+        self.panel.clear();
+        let front = match touched {
+            Some(front) => {
+                if !kernels.eliminate(front, r, b, 1.0) {
+                    return false;
+                }
+                self.panel.extend_from_slice(&front[..r * b]);
+                front
+            }
+            None => &cell.free_body[..],
+        };
+        let columns: Vec<(usize, &[f64])> = self.tractions.iter().flat_map(|t| t.forces()).collect();
+        let n = i + columns.len();
+        if geometric.is_none() && columns.is_empty() && matrix.len() == n * n {
+            // A cell that neither turns nor bears anything contributes the same whenever it does.
+            self.extra.clear();
+            return true;
+        }
+        matrix.resize(n * n, 0.0);
+        for col in 0..i {
+            let from = (b + col) * r + b;
+            matrix[col * n + col..col * n + i].copy_from_slice(&front[from + col..from + i]);
+        }
+
+        // Tractions, then the geometric row: flank nodes, bore nodes, one row after the other.
+        let panel = if self.panel.is_empty() { &cell.free_body[..r * b] } else { &self.panel };
+        let geometric_flank = geometric.map_or(&[][..], |x| &x.g[..f]);
+        self.extra.clear();
+        let mut yielded = vec![0.0; f];
+        let mut geometric_tractions = vec![0.0; columns.len()];
+        for (k, &(start, column)) in columns.iter().enumerate() {
+            let done = self.extra.len();
+            self.extra.resize(done + r, 0.0);
+            let (earlier, follow) = self.extra.split_at_mut(done);
+            for (x, t) in follow.iter_mut().zip(cell.flank_coupling.chunks_exact(f)) {
+                *x = -dot(column, &t[start..start + column.len()]);
+            }
+            yielded.fill(0.0);
+            let flexibility = &cell.flank_flexibility[start * f..(start + column.len()) * f];
+            kernels.multiply_add(flexibility, one(column), 1.0, one_mut(&mut yielded));
+            for (l, &(other, against)) in columns.iter().enumerate().skip(k) {
+                matrix[i + l + (i + k) * n] = -dot(against, &yielded[other..other + against.len()]);
+            }
+            if geometric.is_some() {
+                geometric_tractions[k] = -dot(geometric_flank, &yielded);
+            }
+            let (bore, faces) = follow.split_at_mut(b);
+            kernels.forward(panel, [r, b], 1.0, one_mut(bore), one_mut(faces));
+            for (l, earlier) in earlier.chunks_exact(b.max(1)).enumerate() {
+                matrix[i + k + (i + l) * n] -= dot(earlier, bore);
+            }
+            matrix[i + k + (i + k) * n] -= dot(bore, bore);
+            for (col, x) in faces.iter().enumerate() {
+                matrix[i + k + col * n] = *x;
+            }
+            self.extra.truncate(done + b);
+        }
+        self.turn_rate.clear();
+        self.flank_geometric.clear();
+        if let Some(Geometric { a, g, c }) = geometric {
+            let done = self.extra.len();
+            self.extra.extend_from_slice(&g[f..]);
+            let (earlier, follow) = self.extra.split_at_mut(done);
+            kernels.multiply_transposed_add(&cell.flank_coupling, one(geometric_flank), -1.0, one_mut(follow));
+            yielded.fill(0.0);
+            kernels.multiply_add(&cell.flank_flexibility, one(geometric_flank), 1.0, one_mut(&mut yielded));
+            let mut c = c - dot(geometric_flank, &yielded);
+            let (bore, faces) = follow.split_at_mut(b);
+            kernels.forward(panel, [r, b], 1.0, one_mut(bore), one_mut(faces));
+            for (x, earlier) in geometric_tractions.iter_mut().zip(earlier.chunks_exact(b.max(1))) {
+                *x -= dot(earlier, bore);
+            }
+            c -= dot(bore, bore);
+            for col in 0..i {
+                let (ga, aa) = (a[col], faces[col] + c * a[col]);
+                for row in col..i {
+                    matrix[row + col * n] += faces[row] * ga + a[row] * aa;
+                }
+                for (row, x) in geometric_tractions.iter().enumerate() {
+                    matrix[i + row + col * n] += x * ga;
+                }
+            }
+            self.extra.truncate(done + b);
+            self.turn_rate.extend_from_slice(a);
+            self.flank_geometric.extend_from_slice(geometric_flank);
+        }
+        rotate_faces(matrix, n, i / 2, &self.place.faces);
+        true
     }
 
     fn panel<'a>(&'a self, cell: &'a Cell) -> &'a [f64] {
@@ -139,209 +230,89 @@ impl CellTangent {
     /// Brings the forces on flank and bore nodes (`unknowns` of `x`) to faces and tractions (`chain`). What the way
     /// back needs of it goes to `kept`, [`CellAt::kept`] of them.
     pub fn forward<const W: usize>(&self, at: CellAt, x: &[[f64; W]], chain: &mut [[f64; W]], kept: &mut [[f64; W]]) {
-        at.kernels.0.dispatch(CellForward { tangent: self, at, x, chain, kept });
+        let CellAt { kernels, cell, unknowns, order } = at;
+        let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
+        let [force, body, yielded] = at.parts(kept);
+        force.iter_mut().zip(unknowns).for_each(|(force, u)| *force = x[*u as usize]);
+        rotate_sides(force, back(self.place.frame));
+        let (flank, bore) = force.split_at_mut(f);
+        body[..b].copy_from_slice(bore);
+        body[b..].fill([0.0; W]);
+        yielded.fill([0.0; W]);
+        kernels.multiply_transposed_add(&cell.flank_coupling, flank, -1.0, body);
+        kernels.multiply_add(&cell.flank_flexibility, flank, 1.0, yielded);
+        bore.copy_from_slice(&body[..b]);
+        let faces = &mut body[b..];
+        kernels.forward(self.panel(cell), [b + 2 * face, b], 1.0, bore, faces);
+        // Rows of tractions and geometry.
+        let columns = self.tractions.iter().flat_map(|t| t.forces());
+        let on = |(start, column): (usize, &[f64])| dot_sides(column, &yielded[start..start + column.len()]);
+        let mut rest: Vec<[f64; W]> = columns.map(|column| on(column).map(|x| -x)).collect();
+        if !self.turn_rate.is_empty() {
+            rest.push(dot_sides(&self.flank_geometric, yielded).map(|x| -x));
+        }
+        for (r, earlier) in rest.iter_mut().zip(self.extra.chunks_exact(b.max(1))) {
+            add(r, -1.0, &dot_sides(earlier, bore));
+        }
+        if let (Some(folded), false) = (rest.last(), self.turn_rate.is_empty()) {
+            faces.iter_mut().zip(&self.turn_rate).for_each(|(x, a)| add(x, *a, folded));
+        }
+        for (side, part) in faces.chunks_exact_mut(face).enumerate() {
+            rotate_sides(part, self.place.faces[side]);
+            let to = order.offset(self.place.blocks[side] as usize);
+            chain[to..to + face].iter_mut().zip(part.iter()).for_each(|(c, x)| add(c, 1.0, x));
+        }
+        let mut rest = rest.as_slice();
+        for traction in &self.tractions {
+            let (own, others) = rest.split_at(traction.rank());
+            let to = order.offset(traction.block as usize);
+            chain[to..to + own.len()].iter_mut().zip(own).for_each(|(c, x)| add(c, 1.0, x));
+            rest = others;
+        }
     }
 
     /// Displacements of flank and bore nodes, faces and tractions being solved; `kept` as the way forward left it.
     pub fn backward<const W: usize>(&self, at: CellAt, x: &mut [[f64; W]], chain: &[[f64; W]], kept: &mut [[f64; W]]) {
-        at.kernels.0.dispatch(CellBackward { tangent: self, at, x, chain, kept });
+        let CellAt { kernels, cell, unknowns, order } = at;
+        let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
+        let [force, body, yielded] = at.parts(kept);
+        for (side, part) in body[b..].chunks_exact_mut(face).enumerate() {
+            let from = order.offset(self.place.blocks[side] as usize);
+            part.copy_from_slice(&chain[from..from + face]);
+            rotate_sides(part, back(self.place.faces[side]));
+        }
+        let mut rest = Vec::with_capacity(self.extra.len() / b.max(1));
+        for traction in &self.tractions {
+            let from = order.offset(traction.block as usize);
+            rest.extend_from_slice(&chain[from..from + traction.rank()]);
+        }
+        let turn = dot_sides(&self.turn_rate, &body[b..b + self.turn_rate.len()]);
+        if !self.turn_rate.is_empty() {
+            rest.push(turn);
+        }
+        let (flank, bore) = force.split_at_mut(f);
+        for (value, earlier) in rest.iter().zip(self.extra.chunks_exact(b.max(1))) {
+            bore.iter_mut().zip(earlier).for_each(|(x, e)| add(x, -e, value));
+        }
+        let (bore_body, faces) = body.split_at_mut(b);
+        kernels.backward(self.panel(cell), [b + 2 * face, b], 1.0, bore, faces);
+        bore_body.copy_from_slice(bore);
+        // Flanks: yielded - C (G lambda + g turn) - T body.
+        flank.copy_from_slice(yielded);
+        yielded.fill([0.0; W]);
+        yielded.iter_mut().zip(&self.flank_geometric).for_each(|(l, g)| add(l, *g, &turn));
+        let columns = self.tractions.iter().flat_map(|t| t.forces());
+        for ((start, column), traction) in columns.zip(rest.iter()) {
+            yielded[start..].iter_mut().zip(column).for_each(|(l, g)| add(l, *g, traction));
+        }
+        kernels.multiply_add(&cell.flank_flexibility, yielded, -1.0, flank);
+        kernels.multiply_add(&cell.flank_coupling, body, -1.0, flank);
+        rotate_sides(force, self.place.frame);
+        for (u, value) in unknowns.iter().zip(force.iter()) {
+            x[*u as usize] = *value;
+        }
     }
 }
-
-// See [`CellTangent::reduce`].
-kernel!(Reduce {
-    tangent: &'a mut CellTangent, kernels: DenseKernels, cell: &'a Cell, placed: (CellPlacement, Vec<Traction>),
-    geometric: Option<Geometric<'a>>, touched: Option<&'a mut [f64]>, contribution: &'a mut Contribution
-} -> bool, |_simd| {
-    let (f, b, i) = (cell.flank(), cell.bore(), 2 * cell.face());
-    let r = b + i;
-    let (place, tractions) = placed;
-    let Contribution { blocks, matrix } = contribution;
-    tangent.place = place;
-    tangent.tractions = tractions;
-
-    // Bore and faces.
-    tangent.panel.clear();
-    let front = match touched {
-        Some(front) => {
-            if !kernels.eliminate(front, r, b, 1.0) {
-                return false;
-            }
-            tangent.panel.extend_from_slice(&front[..r * b]);
-            front
-        }
-        None => &cell.free_body[..],
-    };
-    let columns: Vec<(usize, &[f64])> = tangent.tractions.iter().flat_map(|t| t.forces()).collect();
-    let n = i + columns.len();
-    if geometric.is_none() && columns.is_empty() && *blocks == place.blocks {
-        // A cell that neither turns nor bears anything contributes the same whenever it does.
-        tangent.extra.clear();
-        return true;
-    }
-    matrix.resize(n * n, 0.0);
-    for col in 0..i {
-        let from = (b + col) * r + b;
-        matrix[col * n + col..col * n + i].copy_from_slice(&front[from + col..from + i]);
-    }
-
-    // Tractions, then the geometric row: flank nodes, bore nodes, one row after the other.
-    let panel = if tangent.panel.is_empty() { &cell.free_body[..r * b] } else { &tangent.panel };
-    let geometric_flank = geometric.map_or(&[][..], |x| &x.g[..f]);
-    tangent.extra.clear();
-    let mut yielded = vec![0.0; f];
-    let mut geometric_tractions = vec![0.0; columns.len()];
-    for (k, &(start, column)) in columns.iter().enumerate() {
-        let done = tangent.extra.len();
-        tangent.extra.resize(done + r, 0.0);
-        let (earlier, follow) = tangent.extra.split_at_mut(done);
-        for (x, t) in follow.iter_mut().zip(cell.flank_coupling.chunks_exact(f)) {
-            *x = -dot(column, &t[start..start + column.len()]);
-        }
-        yielded.fill(0.0);
-        let flexibility = &cell.flank_flexibility[start * f..(start + column.len()) * f];
-        kernels.multiply_add(flexibility, one(column), 1.0, one_mut(&mut yielded));
-        for (l, &(other, against)) in columns.iter().enumerate().skip(k) {
-            matrix[i + l + (i + k) * n] = -dot(against, &yielded[other..other + against.len()]);
-        }
-        if geometric.is_some() {
-            geometric_tractions[k] = -dot(geometric_flank, &yielded);
-        }
-        let (bore, faces) = follow.split_at_mut(b);
-        kernels.forward(panel, [r, b], 1.0, one_mut(bore), one_mut(faces));
-        for (l, earlier) in earlier.chunks_exact(b.max(1)).enumerate() {
-            matrix[i + k + (i + l) * n] -= dot(earlier, bore);
-        }
-        matrix[i + k + (i + k) * n] -= dot(bore, bore);
-        for (col, x) in faces.iter().enumerate() {
-            matrix[i + k + col * n] = *x;
-        }
-        tangent.extra.truncate(done + b);
-    }
-    tangent.turn_rate.clear();
-    tangent.flank_geometric.clear();
-    if let Some(Geometric { a, g, c }) = geometric {
-        let done = tangent.extra.len();
-        tangent.extra.extend_from_slice(&g[f..]);
-        let (earlier, follow) = tangent.extra.split_at_mut(done);
-        kernels.multiply_transposed_add(&cell.flank_coupling, one(geometric_flank), -1.0, one_mut(follow));
-        yielded.fill(0.0);
-        kernels.multiply_add(&cell.flank_flexibility, one(geometric_flank), 1.0, one_mut(&mut yielded));
-        let mut c = c - dot(geometric_flank, &yielded);
-        let (bore, faces) = follow.split_at_mut(b);
-        kernels.forward(panel, [r, b], 1.0, one_mut(bore), one_mut(faces));
-        for (x, earlier) in geometric_tractions.iter_mut().zip(earlier.chunks_exact(b.max(1))) {
-            *x -= dot(earlier, bore);
-        }
-        c -= dot(bore, bore);
-        for col in 0..i {
-            let (ga, aa) = (a[col], faces[col] + c * a[col]);
-            for row in col..i {
-                matrix[row + col * n] += faces[row] * ga + a[row] * aa;
-            }
-            for (row, x) in geometric_tractions.iter().enumerate() {
-                matrix[i + row + col * n] += x * ga;
-            }
-        }
-        tangent.extra.truncate(done + b);
-        tangent.turn_rate.extend_from_slice(a);
-        tangent.flank_geometric.extend_from_slice(geometric_flank);
-    }
-    rotate_faces(matrix, n, i / 2, &tangent.place.faces);
-    blocks.clear();
-    blocks.extend(tangent.place.blocks);
-    blocks.extend(tangent.tractions.iter().map(|t| t.block));
-    true
-});
-
-// See [`CellTangent::forward`].
-kernel!(CellForward<W> {
-    tangent: &'a CellTangent, at: CellAt<'a>, x: &'a [[f64; W]], chain: &'a mut [[f64; W]], kept: &'a mut [[f64; W]]
-} -> (), |_simd| {
-    let CellAt { kernels, cell, unknowns, order } = at;
-    let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
-    let [force, body, yielded] = at.parts(kept);
-    force.iter_mut().zip(unknowns).for_each(|(force, u)| *force = x[*u as usize]);
-    rotate_sides(force, back(tangent.place.frame));
-    let (flank, bore) = force.split_at_mut(f);
-    body[..b].copy_from_slice(bore);
-    body[b..].fill([0.0; W]);
-    yielded.fill([0.0; W]);
-    kernels.multiply_transposed_add(&cell.flank_coupling, flank, -1.0, body);
-    kernels.multiply_add(&cell.flank_flexibility, flank, 1.0, yielded);
-    bore.copy_from_slice(&body[..b]);
-    let faces = &mut body[b..];
-    kernels.forward(tangent.panel(cell), [b + 2 * face, b], 1.0, bore, faces);
-    // Rows of tractions and geometry.
-    let columns = tangent.tractions.iter().flat_map(|t| t.forces());
-    let on = |(start, column): (usize, &[f64])| dot_sides(column, &yielded[start..start + column.len()]);
-    let mut rest: Vec<[f64; W]> = columns.map(|column| on(column).map(|x| -x)).collect();
-    if !tangent.turn_rate.is_empty() {
-        rest.push(dot_sides(&tangent.flank_geometric, yielded).map(|x| -x));
-    }
-    for (r, earlier) in rest.iter_mut().zip(tangent.extra.chunks_exact(b.max(1))) {
-        add(r, -1.0, &dot_sides(earlier, bore));
-    }
-    if let (Some(folded), false) = (rest.last(), tangent.turn_rate.is_empty()) {
-        faces.iter_mut().zip(&tangent.turn_rate).for_each(|(x, a)| add(x, *a, folded));
-    }
-    for (side, part) in faces.chunks_exact_mut(face).enumerate() {
-        rotate_sides(part, tangent.place.faces[side]);
-        let to = order.offset(tangent.place.blocks[side] as usize);
-        chain[to..to + face].iter_mut().zip(part.iter()).for_each(|(c, x)| add(c, 1.0, x));
-    }
-    let mut rest = rest.as_slice();
-    for traction in &tangent.tractions {
-        let (own, others) = rest.split_at(traction.rank());
-        let to = order.offset(traction.block as usize);
-        chain[to..to + own.len()].iter_mut().zip(own).for_each(|(c, x)| add(c, 1.0, x));
-        rest = others;
-    }
-});
-
-// See [`CellTangent::backward`].
-kernel!(CellBackward<W> {
-    tangent: &'a CellTangent, at: CellAt<'a>, x: &'a mut [[f64; W]], chain: &'a [[f64; W]], kept: &'a mut [[f64; W]]
-} -> (), |_simd| {
-    let CellAt { kernels, cell, unknowns, order } = at;
-    let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
-    let [force, body, yielded] = at.parts(kept);
-    for (side, part) in body[b..].chunks_exact_mut(face).enumerate() {
-        let from = order.offset(tangent.place.blocks[side] as usize);
-        part.copy_from_slice(&chain[from..from + face]);
-        rotate_sides(part, back(tangent.place.faces[side]));
-    }
-    let mut rest = Vec::with_capacity(tangent.extra.len() / b.max(1));
-    for traction in &tangent.tractions {
-        let from = order.offset(traction.block as usize);
-        rest.extend_from_slice(&chain[from..from + traction.rank()]);
-    }
-    let turn = dot_sides(&tangent.turn_rate, &body[b..b + tangent.turn_rate.len()]);
-    if !tangent.turn_rate.is_empty() {
-        rest.push(turn);
-    }
-    let (flank, bore) = force.split_at_mut(f);
-    for (value, earlier) in rest.iter().zip(tangent.extra.chunks_exact(b.max(1))) {
-        bore.iter_mut().zip(earlier).for_each(|(x, e)| add(x, -e, value));
-    }
-    let (bore_body, faces) = body.split_at_mut(b);
-    kernels.backward(tangent.panel(cell), [b + 2 * face, b], 1.0, bore, faces);
-    bore_body.copy_from_slice(bore);
-    // Flanks: yielded - C (G lambda + g turn) - T body.
-    flank.copy_from_slice(yielded);
-    yielded.fill([0.0; W]);
-    yielded.iter_mut().zip(&tangent.flank_geometric).for_each(|(l, g)| add(l, *g, &turn));
-    let columns = tangent.tractions.iter().flat_map(|t| t.forces());
-    for ((start, column), traction) in columns.zip(rest.iter()) {
-        yielded[start..].iter_mut().zip(column).for_each(|(l, g)| add(l, *g, traction));
-    }
-    kernels.multiply_add(&cell.flank_flexibility, yielded, -1.0, flank);
-    kernels.multiply_add(&cell.flank_coupling, body, -1.0, flank);
-    rotate_sides(force, tangent.place.frame);
-    for (u, value) in unknowns.iter().zip(force.iter()) {
-        x[*u as usize] = *value;
-    }
-});
 
 /// Dot products with W right-hand sides.
 #[inline]
@@ -374,7 +345,6 @@ pub fn rotate_pairs(x: &mut [f64], turn: Turn) {
 }
 
 /// Dot product in four strands: at these lengths a kernel is not worth its call.
-#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a4, b4) = (a[..n].chunks_exact(4), b[..n].chunks_exact(4));
@@ -395,7 +365,6 @@ pub fn back((sin, cos): Turn) -> Turn {
 }
 
 /// Turns the first two groups of `half` unknowns of a matrix (lower triangle, order n) by an angle each.
-#[inline(always)]
 fn rotate_faces(matrix: &mut [f64], n: usize, half: usize, turns: &[Turn; 2]) {
     for k in (0..2 * half).step_by(2) {
         // The rotation of columns needs the whole of the blocks on the diagonal.

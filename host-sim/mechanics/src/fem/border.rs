@@ -45,7 +45,8 @@ impl Border {
 /// A border eliminated with the factor of its sparse part, ready to solve with that factor.
 #[derive(Debug, Clone)]
 pub struct BorderedSystem {
-    border: Border,
+    /// The entries of each column of B, which is empty but for a few nodes of each sector.
+    columns: Vec<Vec<(usize, f64)>>,
     /// `A^-1 B`.
     solved: Vec<f64>,
     /// `D - B^T A^-1 B`.
@@ -57,10 +58,17 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// The same, passing over stretches of zeros: a column of a border is empty but for a few nodes of each sector.
-fn dot_sparse(column: &[f64], x: &[f64]) -> f64 {
-    let stretches = column.chunks(8).zip(x.chunks(8)).filter(|(column, _)| column.iter().any(|c| *c != 0.0));
-    stretches.flat_map(|(column, x)| column.iter().zip(x)).map(|(c, x)| c * x).sum()
+/// The same with a column of few entries.
+fn dot_sparse(column: &[(usize, f64)], x: &[f64]) -> f64 {
+    column.iter().map(|(k, c)| c * x[*k]).sum()
+}
+
+/// Largest magnitude, found in strands that a vector unit can keep apart.
+pub(crate) fn largest(x: &[f64]) -> f64 {
+    let (eights, rest) = x.as_chunks::<8>();
+    let mut most = [0.0_f64; 8];
+    eights.iter().for_each(|eight| most.iter_mut().zip(eight).for_each(|(m, x)| *m = m.max(x.abs())));
+    most.iter().chain(rest).fold(0.0, |m, x| m.max(x.abs()))
 }
 
 impl BorderedSystem {
@@ -75,12 +83,14 @@ impl BorderedSystem {
         }
         let f = solved.split_off(m * n);
         let mut schur = border.corner.clone();
-        for i in 0..m {
-            for j in 0..m {
-                schur[i * m + j] -= dot_sparse(&border.columns[i * n..(i + 1) * n], &solved[j * n..(j + 1) * n]);
+        let entries = |column: &[f64]| column.iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect();
+        let columns: Vec<Vec<(usize, f64)>> = border.columns.chunks_exact(n).map(entries).collect();
+        for (row, column) in schur.chunks_exact_mut(m).zip(&columns) {
+            for (entry, solved) in row.iter_mut().zip(solved.chunks_exact(n)) {
+                *entry -= dot_sparse(column, solved);
             }
         }
-        (BorderedSystem { border: border.clone(), solved, schur }, f)
+        (BorderedSystem { columns, solved, schur }, f)
     }
 
     /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is
@@ -95,8 +105,8 @@ impl BorderedSystem {
     #[must_use]
     pub(crate) fn complete(&self, f: &mut [f64], g: &mut [f64]) -> bool {
         let n = f.len();
-        for (i, gi) in g.iter_mut().enumerate() {
-            *gi -= dot_sparse(&self.border.columns[i * n..(i + 1) * n], f);
+        for (gi, column) in g.iter_mut().zip(&self.columns) {
+            *gi -= dot_sparse(column, f);
         }
         if !self.solve_border(g) {
             return false;
@@ -112,7 +122,7 @@ impl BorderedSystem {
     /// z alone, for f = 0, in place of g.
     #[must_use]
     pub(crate) fn solve_border(&self, g: &mut [f64]) -> bool {
-        solve_dense(&mut self.schur.clone(), g, self.border.width)
+        solve_dense(&mut self.schur.clone(), g, self.columns.len())
     }
 }
 

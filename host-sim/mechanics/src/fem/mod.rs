@@ -7,7 +7,7 @@ pub mod element;
 pub mod material;
 mod pattern;
 
-pub(crate) use border::dot;
 pub use border::{Border, BorderedSystem, Factor};
+pub(crate) use border::{dot, largest};
 pub use cholesky::Cholesky;
 pub use pattern::{PackedPositions, Pattern};

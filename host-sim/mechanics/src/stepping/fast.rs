@@ -10,8 +10,8 @@ use std::rc::Rc;
 use rayon::prelude::*;
 
 use crate::condense::{
-    CellAt, CellPlacement, CellState, CellTangent, Chain, ChainBlock, CoRotation, CondensedWheel, Contribution,
-    DenseKernels, Geometric, Traction, Turn, back, one, one_mut, rotate_pairs, rotate_sides,
+    CellAt, CellPlacement, CellState, CellTangent, Chain, ChainBlock, CoRotation, CondensedWheel, DenseKernels,
+    Geometric, Traction, Turn, back, one, one_mut, rotate_pairs, rotate_sides,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
@@ -193,8 +193,9 @@ pub(super) struct CondensedWheels<'p> {
     bore: Vec<(usize, [f64; 21])>,
     flanks: Vec<(FlankPair, Vec<f64>)>,
     factor: Kept,
-    /// Work space of a factorisation.
-    contributions: Vec<Contribution>,
+    /// What cells contribute to a factorisation: work space for those of the flexspline, then each of the circular
+    /// spline.
+    contributions: Vec<Vec<f64>>,
     /// Work space of a solution.
     kept: Vec<f64>,
     /// Pitches by which the state is turned against the one that the factor was made for.
@@ -252,13 +253,26 @@ impl<'p> CondensedWheels<'p> {
         (by_cell, ranks)
     }
 
+    /// Blocks of the faces of a cell, those of the circular spline after those of the flexspline.
+    fn faces(&self, cell: usize) -> [u32; 2] {
+        let (fs, all) = (self.model.flexspline.count(), self.live.len());
+        let next = if cell + 1 == fs {
+            0
+        } else if cell + 1 == all {
+            fs
+        } else {
+            cell + 1
+        };
+        [cell as u32, next as u32]
+    }
+
     /// Reduces a flexspline cell.
     fn reduce_flexspline_cell(
         &self,
         j: usize,
         tangent: &mut CellTangent,
         tractions: Vec<Traction>,
-        contribution: &mut Contribution,
+        matrix: &mut Vec<f64>,
         front: &mut Vec<f64>,
     ) -> bool {
         let mesh = self.model.fs_mesh();
@@ -271,11 +285,11 @@ impl<'p> CondensedWheels<'p> {
         let place = CellPlacement {
             frame: (mesh.sector_angle(j) + state.turn).sin_cos(),
             faces: [0.5, -0.5].map(|half| (state.turn + half * mesh.pitch()).sin_cos()),
-            blocks: [j as u32, ((j + 1) % mesh.teeth) as u32],
+            blocks: self.faces(j),
         };
         let geometric = Geometric { a: &state.turn_rate, g: &g, c };
         let touched = self.touched_body(j, front).then_some(front.as_mut_slice());
-        tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), touched, contribution)
+        tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), touched, matrix)
     }
 
     /// The matrix of bore and face nodes of a cell with the contact on its bore, if there is any.
@@ -329,16 +343,16 @@ impl<'p> CondensedWheels<'p> {
         t: usize,
         tangent: &mut CellTangent,
         tractions: Vec<Traction>,
-        contribution: &mut Contribution,
+        matrix: &mut Vec<f64>,
     ) -> bool {
         let (first, mesh) = (self.model.fs_mesh().teeth, self.model.cs_mesh());
         let place = CellPlacement {
             frame: cs_frame(mesh, t).sin_cos(),
             faces: [0.5, -0.5].map(|half| (half * mesh.pitch()).sin_cos()),
-            blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
+            blocks: self.faces(first + t),
         };
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
-        tangent.reduce(self.kernels, cell, (place, tractions), None, None, contribution)
+        tangent.reduce(self.kernels, cell, (place, tractions), None, None, matrix)
     }
 
     /// Places the flank nodes of these cells where they stand while no force acts on them.
@@ -564,40 +578,48 @@ impl Wheels for CondensedWheels<'_> {
 
     fn factorise(&mut self, spring: f64) -> bool {
         let (mut tractions, ranks) = self.tractions();
+        let blocks = self.blocks(&ranks);
         let mut factor = Rc::try_unwrap(std::mem::take(&mut self.factor)).unwrap_or_default();
-        factor.cells.resize_with(self.live.len(), CellTangent::default);
+        let Factorisation { live, cells, chain } = &mut factor;
+        live.clone_from(&self.live);
+        cells.resize_with(live.len(), CellTangent::default);
+        let of_cell = |(c, tractions): (usize, &Vec<Traction>)| {
+            self.faces(c).into_iter().chain(tractions.iter().map(|traction| traction.block)).collect()
+        };
+        let mut contributions: Vec<Vec<u32>> = tractions.iter().enumerate().map(of_cell).collect();
+        // Springs, the anchor (tangential is y in the frame of a face), and the unit of the tractions.
+        let diagonal = |block: &ChainBlock| if block.sign < 0.0 { -1.0 } else { spring };
+        let stiffened = blocks.iter().enumerate().filter(|(k, block)| diagonal(block) != 0.0 || *k == 0);
+        contributions.extend(stiffened.map(|(k, _)| vec![k as u32]));
+        let (mut matrices, mut front) = (std::mem::take(&mut self.contributions), Vec::new());
         let fs_cells = self.model.flexspline.count();
-        factor.live.clone_from(&self.live);
-        let mut contributions = std::mem::take(&mut self.contributions);
-        contributions.resize_with(factor.cells.len(), Contribution::default);
-        let mut front = Vec::new();
-        let mut cells = factor.cells.iter_mut().zip(&mut contributions).enumerate();
-        let mut definite = cells.all(|(c, (tangent, contribution))| {
-            let tractions = std::mem::take(&mut tractions[c]);
-            if c < fs_cells {
-                self.reduce_flexspline_cell(c, tangent, tractions, contribution, &mut front)
-            } else {
-                self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions, contribution)
-            }
-        });
-        if definite {
-            let blocks = self.blocks(&ranks);
-            // Springs, the anchor (tangential is y in the frame of a face), and the unit of the tractions.
-            for (k, block) in blocks.iter().enumerate() {
-                let n = block.size;
-                let diagonal = if block.sign < 0.0 { -1.0 } else { spring };
+        matrices.resize_with(1 + live.len() - fs_cells, Vec::new);
+        let definite = chain.factorise(&blocks, &contributions, |c, add| {
+            let Some(tangent) = cells.get_mut(c) else {
+                let k = contributions[c][0] as usize;
+                let n = blocks[k].size;
                 let mut matrix = vec![0.0; n * n];
-                (0..n).for_each(|i| matrix[i * n + i] = diagonal);
+                matrix.iter_mut().step_by(n + 1).for_each(|x| *x = diagonal(&blocks[k]));
                 if k == 0 {
                     matrix[n + 1] += ANCHOR;
                 }
-                if diagonal != 0.0 || k == 0 {
-                    contributions.push(Contribution { blocks: vec![k as u32], matrix });
-                }
+                add(&matrix);
+                return true;
+            };
+            let tractions = std::mem::take(&mut tractions[c]);
+            // Cells of the flexspline share a matrix, those of the circular spline may have theirs from last time.
+            let matrix = &mut matrices[(c + 1).saturating_sub(fs_cells)];
+            let definite = if c < fs_cells {
+                self.reduce_flexspline_cell(c, tangent, tractions, matrix, &mut front)
+            } else {
+                self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions, matrix)
+            };
+            if definite {
+                add(matrix);
             }
-            definite = factor.chain.factorise(&blocks, &contributions);
-        }
-        self.contributions = contributions;
+            definite
+        });
+        self.contributions = matrices;
         self.factor = Rc::new(factor);
         self.turned = 0;
         definite

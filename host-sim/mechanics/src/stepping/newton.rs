@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use crate::contact::{AlongFace, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
-use crate::fem::{Border, BorderedSystem, dot};
+use crate::fem::{Border, BorderedSystem, dot, largest};
 use crate::mesh::rotate;
 
 use super::continuation::{
@@ -444,7 +444,6 @@ impl<'p> Solver<'p> {
     /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to
     /// 1.25 (the Lebesgue constant of a quadratic).
     fn motion(&self, step: &NodalField) -> f64 {
-        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let (u, v) = step.free.split_at(2 * self.problem.wheels().0.nodes.len());
         let nodes = largest(u) + largest(v);
         (1.25 + self.leans_within) * std::f64::consts::SQRT_2 * nodes

@@ -1,6 +1,6 @@
 //! Out-of-balance forces, and the step that takes them away.
 
-use crate::fem::dot;
+use crate::fem::{dot, largest};
 
 use super::slip::NodalField;
 use super::state::State;
@@ -67,7 +67,7 @@ impl Unbalance {
 
     /// Relative to the contact forces; the torque, which everything serves, ten times as strictly.
     pub(crate) fn relative(&self) -> f64 {
-        let force = self.force.iter().fold(0.0_f64, |m, x| m.max(x.abs())) / self.scale;
+        let force = largest(&self.force) / self.scale;
         let torque = (self.border[OUTPUT].abs() - self.torque_round_off).max(0.0);
         force.max(10.0 * torque / self.torque_scale)
     }
@@ -94,7 +94,7 @@ impl NodalField {
 
     /// Largest displacement, mm.
     pub fn largest(&self) -> f64 {
-        self.free.iter().fold(1e-30, |m, x| x.abs().max(m))
+        largest(&self.free).max(1e-30)
     }
 
     /// A state further along by a share of the step; nodes of the circular spline that are `held` stay.
