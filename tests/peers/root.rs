@@ -22,7 +22,8 @@ use crate::Claims;
 use crate::dat::{Table, at_step};
 use crate::program::{Limits, calculix};
 
-/// Largest relative difference of the stress. Found: 3.0 and 2.5 %.
+/// Largest relative difference of the stress. Found: 3.0 and 2.5 %, which are those of the mesh: with our elements in
+/// place of half as long ones CalculiX has 345.9 and 424.0 MPa, we 346.2 and 424.1.
 const STRESS: f64 = 0.03;
 /// Where a run stops being worth waiting for; it takes two seconds.
 const LIMITS: Limits = Limits { cpu_s: 120.0, memory_mb: 2000.0 };
