@@ -255,14 +255,9 @@ impl<'p> CondensedWheels<'p> {
 
     /// Blocks of the faces of a cell, those of the circular spline after those of the flexspline.
     fn faces(&self, cell: usize) -> [u32; 2] {
-        let (fs, all) = (self.model.flexspline.count(), self.live.len());
-        let next = if cell + 1 == fs {
-            0
-        } else if cell + 1 == all {
-            fs
-        } else {
-            cell + 1
-        };
+        let fs = self.model.flexspline.count();
+        let ring = if cell < fs { 0..fs } else { fs..self.live.len() };
+        let next = if cell + 1 < ring.end { cell + 1 } else { ring.start };
         [cell as u32, next as u32]
     }
 
