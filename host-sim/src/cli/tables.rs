@@ -372,7 +372,9 @@ fn by_fem(
     drive: &Drive,
     wanted: &[(GeneratorKind, TableSettings)],
 ) -> Vec<Result<MadeTable, Failure>> {
-    let progress = Mutex::new((context.progress("tables"), vec![[0; 2]; wanted.len()]));
+    // What has not begun is expected too, or what is left would grow when it does.
+    let tables: Vec<[usize; 2]> = wanted.iter().map(|(_, settings)| [0, settings.most_increments(drive)]).collect();
+    let progress = Mutex::new((context.progress("tables"), tables));
     wanted
         .par_iter()
         .enumerate()

@@ -64,6 +64,14 @@ impl TableSettings {
         }
     }
 
+    /// Increments that a table will take, about, before its torque nodes are chosen: as many as with the most nodes.
+    #[must_use]
+    pub fn most_increments(&self, drive: &Drive) -> usize {
+        let most = self.torque_nodes.most;
+        // The middles of intervals are looked at too, about one for each node that is found.
+        over_turns(drive) + planned_increments(drive, self, most, 0) + most
+    }
+
     /// Refuses settings that make no table of this drive.
     ///
     /// # Errors
@@ -160,11 +168,9 @@ pub fn make(
         temperature_nodes_c: settings.temperature_nodes_c.clone(),
         positions: settings.positions,
     };
-    let over_turns = if repeats(drive) { 0 } else { deviation_increments() };
     let done = AtomicUsize::new(0);
     let mut choice = settings.torque_nodes;
-    // The middles of intervals are looked at too, about one for each node that is found.
-    let expected = AtomicUsize::new(over_turns + planned_increments(drive, &plan, choice.most, 0) + choice.most);
+    let expected = AtomicUsize::new(settings.most_increments(drive));
     let report = |last: SweepProgress| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         let expected = expected.load(Ordering::Relaxed).max(done);
@@ -180,7 +186,8 @@ pub fn make(
     let chosen = choose_torque_nodes(&repeating, kind, &plan, choice, &sampler)?;
     let nodes = &chosen.torque_nodes_n_m;
     plan.torque_nodes_n_m = settings.sheet.as_ref().map_or(nodes.clone(), |sheet| sheet.with_knees(nodes));
-    let left = over_turns + planned_increments(drive, &plan, plan.torque_nodes_n_m.len() / 2, chosen.known.len());
+    let left =
+        over_turns(drive) + planned_increments(drive, settings, plan.torque_nodes_n_m.len() / 2, chosen.known.len());
     expected.store(done.load(Ordering::Relaxed) + left, Ordering::Relaxed);
     let mut swept = sweep_turns(drive, kind, &plan, &chosen.known, &sampler, settings.solver, &report)?;
     swept.work.add(chosen.work);
@@ -221,6 +228,11 @@ pub fn make(
     made.info.cautions = Caution::of_stiffness(drive).into_iter().chain(looked.cautions()).collect();
     made.info.stiffness = Stiffness::of_table(drive, &table);
     Ok(made)
+}
+
+/// Increments that imperfections take.
+fn over_turns(drive: &Drive) -> usize {
+    if repeats(drive) { 0 } else { deviation_increments() }
 }
 
 /// Whether one tooth pitch says all of a drive.

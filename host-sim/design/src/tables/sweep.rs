@@ -16,6 +16,7 @@ use flexspline_make::Sample;
 
 use rayon::prelude::*;
 
+use super::make::TableSettings;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::{Motion, settling_pitches};
 use flexspline_mechanics::stepping::{Increment, Problem, SolveError, SolverSettings, State};
@@ -315,15 +316,15 @@ pub(crate) fn sweep(
 
 /// Increments, about, that a sweep over N torque nodes on each side of zero takes, where so much is known at one
 /// temperature: at each of them the load comes on, the drive settles and is sampled.
-pub(super) fn planned_increments(drive: &Drive, plan: &SweepPlan, nodes: usize, known: usize) -> usize {
+pub(super) fn planned_increments(drive: &Drive, settings: &TableSettings, nodes: usize, known: usize) -> usize {
     let sides = match Half::of(drive) {
         Half::Forward => 2,
         Half::ForwardLoaded => 1,
     };
-    let settling = settling_pitches(drive.flanks.friction_coefficient) * plan.positions as f64;
+    let settling = settling_pitches(drive.flanks.friction_coefficient) * settings.positions as f64;
     // The first position is where the drive has settled.
-    let at_a_node = settling.ceil() as usize + plan.positions;
-    (sides * nodes * plan.temperature_nodes_c.len()).saturating_sub(known) * at_a_node
+    let at_a_node = settling.ceil() as usize + settings.positions;
+    (sides * nodes * settings.temperature_nodes_c.len()).saturating_sub(known) * at_a_node
 }
 
 /// Which part of the plane of torque and direction is computed; the rest follows.
