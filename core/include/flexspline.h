@@ -1311,8 +1311,8 @@ enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder
 // are, if no more than N - 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at
 // 500 rad/s. After more the encoder is lost: give the tick no sample, and call `flexspline_encoder_start` with what is
 // known otherwise. Wrong readings that agree with each other for longer than the joint's patience, or until the
-// generator could have got there, are believed, as nothing tells them from motion: then, too, start it anew. A tick that
-// is missed counts as one of the N at this call, as two at later ones.
+// generator could have got there, are believed, as nothing tells them from motion: then, too, start it anew. A tick
+// that is missed counts as one of the N at this call, as two at later ones.
 // `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no
 // sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
 // hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint

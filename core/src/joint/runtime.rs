@@ -185,8 +185,8 @@ impl Joint {
     /// than N − 1 in a row were wrong: 3 where a register of one turn is read a thousand times a second at 500 rad/s.
     /// After more the encoder is lost ([`EncoderState::is_lost`]): start it anew from what is known otherwise. Wrong
     /// readings that agree with each other for longer than the joint's patience, or until the generator could have got
-    /// there, are believed, as nothing tells them from motion: then, too, start it anew. A tick that is missed counts as
-    /// one of the N at this call, as two at later ones.
+    /// there, are believed, as nothing tells them from motion: then, too, start it anew. A tick that is missed counts
+    /// as one of the N at this call, as two at later ones.
     ///
     /// `None`: the register cannot read that; joint or encoder are lost; or `generator_rate_rad_s` allows a sixth of
     /// what the register counts in a tick, so that motion hides a wrong bit.

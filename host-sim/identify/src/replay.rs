@@ -250,7 +250,7 @@ pub fn read(
 }
 
 /// A log of which sessions have zeros of their own, with what a table leaves in each about its zero.
-fn on_own_zeros(table: &Table<'_>, mut log: Recording, temperature_c: f64) -> Recording {
+pub(crate) fn on_own_zeros(table: &Table<'_>, mut log: Recording, temperature_c: f64) -> Recording {
     let own: Vec<bool> = log.sessions.iter().map(|session| session.own_zero).collect();
     if own.iter().skip(1).any(|own| *own) {
         let left: Vec<Vec<f64>> =

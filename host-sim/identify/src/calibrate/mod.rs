@@ -583,7 +583,8 @@ fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<Vec<Recording>> {
 const LEAST_START_DEG: f64 = 1.0;
 
 /// A log with each piece that has a zero of its own on the generator's zero of a table, where its waves tell that, and
-/// with what is known of zeros of its sessions. Whole turns stay, unless the output says them: a motor that was homed in another turn did not start anew.
+/// with what is known of zeros of its sessions. Whole turns stay, unless the output says them: a motor that was homed
+/// in another turn did not start anew.
 pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     let prior = Prior::of_table(table, GeneratorKind::Cam);
     let mut sessions = Vec::new();

@@ -253,7 +253,7 @@ fn sessions_that_were_set_to_zero_anew_have_zeros_of_their_own() {
         let torque = c.torque_from_wind_up.as_ref().unwrap();
         assert!(c.held_out.rms_after_arcsec < 2.5 && torque.rms_n_m < 1.6, "{:?} {torque:?}", c.held_out);
         let table = Table::check(&made.table.image).unwrap();
-        let on_one = on_zero_of(&table, log);
+        let on_one = crate::replay::on_own_zeros(&table, on_zero_of(&table, log), 20.0);
         let means = on_one.sessions.iter().map(|session| session.error_rad.iter().sum::<f64>() / session.len() as f64);
         let means: Vec<f64> = means.map(|mean| mean * ARCSEC_PER_RAD).collect();
         assert!(means.iter().all(|mean| (mean - means[0]).abs() < 5.0), "{means:?}");

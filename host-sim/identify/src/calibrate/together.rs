@@ -112,8 +112,8 @@ pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files:
 
 /// A generator that is turned back by what its waves say has to leave less than this share of the squares, … *Guess*.
 const TURNED_BACK: f64 = 0.8;
-/// … and, of what all logs together leave beyond each alone, no more than this share: else it is not the zero alone that
-/// differs. *Guess*.
+/// … and, of what all logs together leave beyond each alone, no more than this share: else it is not the zero alone
+/// that differs. *Guess*.
 const BEYOND_ALONE: f64 = 0.25;
 /// Whole turns are told if without them this multiple of the squares is left, at least. *Guess*.
 const OTHER_TURN: f64 = 1.2;

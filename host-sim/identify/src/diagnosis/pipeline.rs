@@ -464,7 +464,7 @@ impl Diagnosed {
         let evaluation = &self.evaluation;
         let mut extension = Extension { compensation: Some(evaluation.clone()), ..Extension::default() };
         let tables = tables_of(subject, std::slice::from_ref(&self.recording));
-        // A model is no table yet; one that was fitted to these rows is no measure of one that has not seen all of them.
+        // A model is no table yet; one that was fitted to these rows is no measure of one that has not seen them all.
         let most_of_nominal = match (&subject.table, &subject.note) {
             (Some(_), _) => 1.0 - LEAST_GAIN,
             (None, None) => 1.0 / (1.0 - LEAST_GAIN),

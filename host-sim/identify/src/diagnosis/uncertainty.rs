@@ -150,7 +150,7 @@ fn by_noise(fit: &Fit, covariance: &[f64]) -> Vec<f64> {
 
 /// By how much each coefficient is off to first order, as the torque that winds the drive up has noise of its own: its
 /// stiffness comes out too soft, and what goes with the load takes its place (errors in variables; Fuller, Measurement
-/// Error Models, 1987, section 1.1).
+/// Error Models, 1987, section 1.1). By no more than it has come out so: what looks like noise may be load.
 fn by_noise_of_the_load(problem: &Problem<'_>, fit: &Fit, covariance: &[f64]) -> Vec<f64> {
     let (n, rows, fineness) = (fit.priors.len(), problem.on.rows, problem.fineness);
     let Some(stiffness) = problem.on.base.floating.iter().position(|floating| floating.name == "stiffness") else {
@@ -161,8 +161,9 @@ fn by_noise_of_the_load(problem: &Problem<'_>, fit: &Fit, covariance: &[f64]) ->
     let moved = |k: usize| noise_n_m * (wind_up(rows.torque[k] + 0.5) - wind_up(rows.torque[k] - 0.5));
     let squares: f64 = rows.sessions_used().flatten().map(|k| (moved(k) / fineness.noise.white).powi(2)).sum();
     let information = fineness.worth * squares / fineness.stride as f64;
-    let softer = information * (1.0 + fit.solution.coefficients[stiffness]);
-    covariance[stiffness * n..][..n].iter().map(|with_stiffness| softer * with_stiffness).collect()
+    let (coefficient, with) = (fit.solution.coefficients[stiffness], &covariance[stiffness * n..][..n]);
+    let off = (information * (1.0 + coefficient) * with[stiffness]).min(-coefficient).max(0.0);
+    with.iter().map(|with_stiffness| off * with_stiffness / with[stiffness]).collect()
 }
 
 /// How well each term is known, where `beyond` times the noise is left.
