@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::resolution::lattice;
-use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, straight};
+use super::steps::WHOLE_PITCH;
+use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, straight, whole_pitches};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
@@ -31,6 +32,20 @@ fn beyond_chance(rows: usize) -> usize {
     SHORTEST.max(length.ceil() as usize)
 }
 
+/// Whether an output, while the generator stands, moves by whole tooth pitches and has done so within a part of the
+/// stretch: teeth that skip move it, not a generator that is not read.
+fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
+    let angles = &output[stretch.clone()];
+    let (first, last) = (angles[0], angles[angles.len() - 1]);
+    let apart = (angles.len() / 4).max(1);
+    whole_pitches(last - first, gear, WHOLE_PITCH, 0.0).is_some()
+        && angles.windows(apart + 1).any(|a| (a[apart] - a[0]).abs() > SUDDEN * (last - first).abs())
+}
+
+/// A motion is sudden if this share of it happens within a quarter of the time. *Guess*: an even motion makes a
+/// quarter.
+const SUDDEN: f64 = 0.9;
+
 /// Finds frozen stretches and leaves their rows out; a channel that is frozen throughout is an error.
 pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
     let rows = log.len();
@@ -49,7 +64,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         let of_output = channel != Quantity::Generator;
         for stretch in log.runs(values, 3, same) {
             let missed = missed(other, &stretch) / if of_output { gear.ratio.abs() } else { 1.0 };
-            if missed > LONG_DWELL_RAD || (of_output && outputs_noisy && stretch.len() >= longest) {
+            let long = missed > LONG_DWELL_RAD && (of_output || !slips_a_tooth(output, &stretch, gear));
+            if long || (of_output && outputs_noisy && stretch.len() >= longest) {
                 frozen.push((channel, stretch, missed));
             }
         }

@@ -45,7 +45,7 @@ const AT_ONCE: usize = 8;
 const ROUNDS: usize = 4;
 /// A step is that many whole tooth pitches if it differs by less than this share of one. *Guess*: pitch errors of fine
 /// gears are a third of that.
-const WHOLE_PITCH: f64 = 0.01;
+pub(super) const WHOLE_PITCH: f64 = 0.01;
 /// Load of this share of its largest holds the drive on one flank. *Guess*: above the friction of most drives.
 pub(super) const HELD: f64 = 0.1;
 /// A step above this is no change of flank, rad. *Guess*: three arc-minutes, wider than the clearance of drives that
