@@ -172,7 +172,8 @@ fn what_no_table_can_hold_is_said_and_left_alone() {
     let left = &diagnosis["extension"]["compensation"]["not_applied"][0];
     assert_eq!(left["cause"], "sensor_latency");
     assert!(left["reason"].as_str().unwrap().contains("speed"));
-    assert_eq!(names(&desk.path("found")), ["diagnosis.json", "drive-extended.toml", "report.html"]);
+    let files = [&CALIBRATED[..], &["diagnosis.json", "drive-extended.toml", "report.html"]].concat();
+    assert_eq!(names(&desk.path("found")), files);
     assert!(desk.read("found/drive-extended.toml").contains("delay_s"));
 }
 
@@ -192,8 +193,12 @@ fn an_error_of_the_output_encoder_is_not_put_into_tables() {
         let left = &diagnosis["extension"]["compensation"]["not_applied"][0];
         assert_eq!(left["cause"], name);
         assert!(left["reason"].as_str().unwrap().contains("not the joint"));
-        assert!(!names(&desk.path("found")).iter().any(|file| file.ends_with(".fxt")));
+        assert!(!names(&desk.path("found")).iter().any(|file| file.ends_with("extended.fxt")));
     }
+    // Nor into the calibrated one, which leaves the wave as the encoder reads it, 15 arcsec of 16 in a turn.
+    let replay = desk.line("replay made/data.csv --tables found/calibrated.fxt --out replayed --json").done().json();
+    let left = number(&replay, &["rms_residual_arcsec"]);
+    assert!((0.6..0.9).contains(&(left / 15.0)), "{left}");
 }
 
 /// Known by its ratio alone: a table of the causes, or the calibrated one, leaves less of another log of the unit; and
