@@ -153,6 +153,11 @@ impl Nominal {
         angle_rad.copysign(torque_n_m) * ARCSEC_PER_RAD
     }
 
+    /// Wind-up for 1 N·m more at a torque, arcsec.
+    pub(crate) fn slope_arcsec(&self, torque_n_m: f64) -> f64 {
+        self.wind_up_arcsec(torque_n_m + 0.5) - self.wind_up_arcsec(torque_n_m - 0.5)
+    }
+
     /// Kinematic error at a generator angle, arcsec.
     #[must_use]
     pub fn harmonics_arcsec(&self, generator_rad: f64) -> f64 {
@@ -234,14 +239,10 @@ impl Nominal {
     /// a turn of it.
     pub(crate) fn of_table_by_ratio(table: &Table<'_>, ratio: f64) -> Nominal {
         let nominal = Nominal::of_table(table);
-        let at = |psi: &f64| State {
-            generator_rad: *psi,
-            temperature_c: nominal.temperature_c,
-            way: 1.0,
-            ..State::default()
-        };
+        let at = State { temperature_c: nominal.temperature_c, way: 1.0, ..State::default() };
+        let steady_at = |psi: &f64| steady(table, &State { generator_rad: *psi, ..at }, 0.0);
         let angles: Vec<f64> = (0..PLACES_OF_A_TURN).map(|k| TAU * ratio * (f64::from(k) * GOLDEN).fract()).collect();
-        let errors: Vec<f64> = angles.iter().map(|psi| steady(table, &at(psi), 0.0)).collect();
+        let errors: Vec<f64> = angles.iter().map(steady_at).collect();
         let harmonics = harmonics(&angles, &errors, &OF_TWO_LOBES).map_or_else(Vec::new, |(_, lines)| lines);
         let harmonics = harmonics.into_iter().map(|line| Harmonic {
             order_per_generator_turn: line.order,

@@ -692,7 +692,7 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     let of_wind_up = known.nodes().into_iter().filter(|node| node.part == PartName::WindUp.as_str());
     let widest = of_wind_up.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
-    let wind_up_alone_arcsec = if correlation > TURNS_WITH_THE_OUTPUT { widest } else { 0.0 };
+    let wind_up_alone_arcsec = if beside.is_empty() { 0.0 } else { widest };
     notes.extend(load_with_angle(correlation, wind_up_alone_arcsec, half_width_as_recorded_arcsec));
     let torque_from_wind_up = torque_from_wind_up.map(|of| of.known_to(wind_up_alone_arcsec));
     let offset = |(log, middle): (usize, &f64)| {

@@ -273,8 +273,8 @@ impl LogPair<'_> {
         }
         let step = TAU / STEPS_OF_A_TURN / FINE_STEPS;
         let by_output = -ratio * within(off, TAU);
-        let left_by_output = left(&by_output);
-        let absolute = by_output.abs() > step && gains(left_by_output, 1.0 - LEAST_GAIN);
+        let left_by_output = if by_output.abs() > step { left(&by_output) } else { f64::INFINITY };
+        let absolute = gains(left_by_output, 1.0 - LEAST_GAIN);
         let by_waves = || self.by_waves().filter(|zero| gains(left(zero), TURNED_BACK));
         let found = match absolute {
             true => Some(by_output),

@@ -189,12 +189,14 @@ impl Base {
         let wind_up: Vec<f64> = rows.torque.iter().map(|t| nominal.wind_up_arcsec(*t)).collect();
         let harmonics: Vec<f64> = rows.generator.iter().map(|psi| nominal.harmonics_arcsec(*psi)).collect();
         let half_backlash = 0.5 * nominal.backlash_arcsec;
+        let used: Vec<usize> = rows.sessions_used().flatten().collect();
+        let free = if laws.len() > 1 { of_any_drive(rows, &used) } else { FreeSpan::default() };
         let mut best: Option<(f64, PlayLaw, Vec<f64>)> = None;
         for &law in laws {
             let flank = law.flanks(rows, &rows.torque, nominal);
             let left: Vec<f64> =
                 (0..rows.len()).map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k]).collect();
-            let spread = middle_spread(rows, &left, nominal.friction_torque_n_m);
+            let spread = middle_spread(&left, nominal.friction_torque_n_m, rows, (&used, &free));
             // A cause not yet known may look like a clearance that is not crossed at once.
             let needed = if law == PlayLaw::Smooth { FAR_BETTER } else { CLEARLY_BETTER };
             if best.as_ref().is_none_or(|(least, _, _)| spread < needed * least) {
@@ -229,8 +231,7 @@ impl Base {
             add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
         }
         // Nor does a catalogue print the drag of the output, which winds a drive up against its motion.
-        let slope = |torque: f64| nominal.wind_up_arcsec(torque + 0.5) - nominal.wind_up_arcsec(torque - 0.5);
-        let against = |k: usize| -rows.direction[k] * nominal.ratio.signum() * slope(rows.torque[k]);
+        let against = |k: usize| -rows.direction[k] * nominal.ratio.signum() * nominal.slope_arcsec(rows.torque[k]);
         let unknown_n_m = if nominal.friction_torque_n_m > 0.0 { 0.0 } else { DRAG_OF_LOAD * rows.load_scale() };
         add("drag", (0..rows.len()).map(against).collect(), unknown_n_m);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
@@ -283,15 +284,18 @@ impl Base {
     }
 }
 
-/// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading, a wrong
-/// ratio and waves of the output are taken out before: any drive may have them, whatever its play does, and they would
-/// decide between the laws.
-fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
-    let used: Vec<usize> = rows.sessions_used().flatten().collect();
+/// What any drive may have, whatever its play does, and what would decide between the laws of the play: a zero, a late
+/// reading, a wrong ratio and waves of the output, over the rows that are learnt from.
+fn of_any_drive(rows: &Rows, used: &[usize]) -> FreeSpan {
     let of = |column: &[f64]| -> Vec<f64> { used.iter().map(|k| column[*k]).collect() };
     let any = [vec![1.0; used.len()], of(&rows.speed), of(&rows.output)].into_iter();
-    let free = FreeSpan::default().beyond(any.chain([1.0, 2.0].iter().flat_map(|k| waves(*k, &rows.output, &used))));
-    let inside = used.iter().zip(free.freed(of(left))).filter(|(k, _)| rows.torque[**k].abs() <= friction);
+    FreeSpan::default().beyond(any.chain([1.0, 2.0].iter().flat_map(|k| waves(*k, &rows.output, used))))
+}
+
+/// Sum of squares that a law of the play leaves where the torque is around friction, freed of that.
+fn middle_spread(left: &[f64], friction: f64, rows: &Rows, (used, free): (&[usize], &FreeSpan)) -> f64 {
+    let left = free.freed(used.iter().map(|k| left[*k]).collect());
+    let inside = used.iter().zip(left).filter(|(k, _)| rows.torque[**k].abs() <= friction);
     inside.map(|(_, left)| left.powi(2)).sum()
 }
 

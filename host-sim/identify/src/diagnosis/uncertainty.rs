@@ -157,8 +157,7 @@ fn by_noise_of_the_load(problem: &Problem<'_>, fit: &Fit, covariance: &[f64]) ->
         return vec![0.0; n];
     };
     let noise_n_m = robust::white_noise(rows.sessions.iter().map(|session| &rows.torque[session.clone()]));
-    let wind_up = |torque: f64| problem.on.nominal.wind_up_arcsec(torque);
-    let moved = |k: usize| noise_n_m * (wind_up(rows.torque[k] + 0.5) - wind_up(rows.torque[k] - 0.5));
+    let moved = |k: usize| noise_n_m * problem.on.nominal.slope_arcsec(rows.torque[k]);
     let squares: f64 = rows.sessions_used().flatten().map(|k| (moved(k) / fineness.noise.white).powi(2)).sum();
     let information = fineness.worth * squares / fineness.stride as f64;
     let (coefficient, with) = (fit.solution.coefficients[stiffness], &covariance[stiffness * n..][..n]);

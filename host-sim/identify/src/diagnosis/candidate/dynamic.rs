@@ -102,11 +102,7 @@ fn gravity_torque(play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>
         .led_by(
             move |on, _| {
                 let rows = on.rows;
-                // Wind-up for 1 N·m more, at the load that is there.
-                let slope = |k: usize| {
-                    let more = on.nominal.wind_up_arcsec(rows.torque[k] + 0.5);
-                    more - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5)
-                };
+                let slope = |k: usize| on.nominal.slope_arcsec(rows.torque[k]);
                 let at = |k: usize| rows.output[k] + rows.orientation[k];
                 vec![
                     main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale).called(SINE),
