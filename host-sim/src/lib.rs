@@ -122,10 +122,10 @@
 //! use flexspline_sim::{ColumnMap, Drive, GeneratorKind, Model, Settings, Subject, diagnose, parse_rows};
 //!
 //! let model = Model::read("../examples/csf17_100/nominal.toml".as_ref())?;
-//! let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
+//! let mut subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
 //! let columns = ColumnMap::parse("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec")?;
 //! let log = std::fs::read("../examples/csf17_100/error_vs_input.csv")?;
-//! let rows = parse_rows("error_vs_input.csv", log, &columns, &subject)?;
+//! let rows = parse_rows("error_vs_input.csv", log, &columns, &mut subject)?;
 //! let diagnosed = diagnose(rows, &subject, &Settings::default(), |_, _, _| ())?;
 //! // 2.5 turns of the generator cannot say which wheel it is.
 //! assert!(diagnosed.diagnosis.causes.is_empty());

@@ -233,12 +233,12 @@ pub fn diagnose<'py>(
                 Subject::of_ratio(*ratio, (drive.clone(), kind), (&name, bytes.into_owned(), &map)).map_err(failed)?
             }
         };
-        let subject = match &kernels {
+        let mut subject = match &kernels {
             Some(path) => with_kernels(subject, path)?,
             None => subject,
         };
         let (name, bytes) = log.bytes().map_err(PythonFailure::bad)?;
-        let recording = parse_rows(&name, bytes, &map, &subject);
+        let recording = parse_rows(&name, bytes, &map, &mut subject);
         let options = Settings { asked, ..Settings::default() };
         let tell = |done: usize, of: usize, what: &str| watch.tell_or_unwind(done, of, what.to_owned());
         let done = diagnose_rows(recording.map_err(failed)?, &subject, &options, tell).map_err(failed)?;

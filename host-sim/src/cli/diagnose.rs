@@ -84,8 +84,8 @@ impl Diagnose {
         let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
         let failed = |error: PipelineError| self.failed(&error);
         let (file, bytes) = bytes_of(&self.data).map_err(bad_input)?;
-        let subject = self.subject(context, image.as_ref(), (&file, &bytes, &map))?;
-        let recording = parse_rows(&file, bytes, &map, &subject).map_err(failed)?;
+        let mut subject = self.subject(context, image.as_ref(), (&file, &bytes, &map))?;
+        let recording = parse_rows(&file, bytes, &map, &mut subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
         // The data that would separate a cause from the strongest named one are looked for in one log only.

@@ -91,11 +91,13 @@ pub(super) fn waves(order: f64, angle: &[f64], places: &[usize]) -> [Vec<f64>; 2
 }
 
 /// What floats freely in every drive whatever its waves are, column by column at the places: zeros of the error and of
-/// sessions, ratio, speed, direction.
+/// sessions, what was taken out of it, ratio, speed, direction.
 fn floating(rows: &Rows, places: &[usize]) -> Vec<Vec<f64>> {
     let since = |start: usize| places.iter().map(|k| f64::from(u8::from(*k >= start))).collect();
     let zeros = rows.sessions.iter().take(MOST_ZEROS + 1).map(|session| since(session.start));
-    zeros.chain([&rows.output, &rows.speed, &rows.direction].map(|column| at(places, column))).collect()
+    let taken_out = rows.taken_out.iter().map(|(_, column)| column);
+    let columns = taken_out.chain([&rows.output, &rows.speed, &rows.direction]);
+    zeros.chain(columns.map(|column| at(places, column))).collect()
 }
 
 /// Standard deviation of a residual in the blocks in which most goes on: at a bench that loads the drive in some
@@ -410,15 +412,64 @@ fn is_certain((_, first): &Tried, (_, second): &Tried, stds: f64) -> bool {
     gain > stds * spread
 }
 
+/// Beginnings of all sessions, where the torque of enough rows winds the drive up.
+fn followed(recording: &Recording, nominal: &Nominal) -> Option<Rows> {
+    let share = FOLLOWED as f64 / recording.sessions.iter().map(Session::len).sum::<usize>() as f64;
+    let begun = |session: &Session| session.part(0..(share.min(1.0) * session.len() as f64) as usize);
+    let begun: Vec<Session> = recording.sessions.iter().map(begun).collect();
+    let rows = Rows::new(&begun, nominal).with_taken_out(&recording.faults, &begun);
+    let winds_up = rows.recorded.torque && nominal.wind_up_arcsec(1.0) != 0.0;
+    (winds_up && rows.count_used() >= SAMPLE / 4).then_some(rows)
+}
+
+/// Frictions of the play that are tried, of the one stated. *Guess*: each beyond what [`super::base::NEAR_FRICTION`]
+/// sets aside of the one before it, as far as drives of one catalogue may differ.
+const FRICTIONS: [f64; 6] = [0.3, 0.45, 0.67, 1.5, 2.25, 3.4];
+/// The one that they are of where none is stated, of the load. *Guess*: the grid ends at 2 and 20 % of it.
+const FRICTION_OF_LOAD: f64 = 0.06;
+
+/// Takes the friction of the play that the rows show in place of the one stated, which no catalogue prints, where it
+/// leaves less for certain; with a note. Else what changes its flank elsewhere would look like a zero of the torque, a
+/// step of an encoder, or a cause.
+pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, table: Option<&Table<'_>>) {
+    let Some(rows) = followed(recording, nominal) else { return };
+    let stated = nominal.friction_torque_n_m;
+    let of = if stated > 0.0 { stated } else { FRICTION_OF_LOAD * rows.load_scale() };
+    let leaves = |friction_torque_n_m: f64| {
+        let nominal = Nominal { friction_torque_n_m, ..nominal.clone() };
+        let sampled = Sampled::new(&rows, (&nominal, table));
+        let by_law = PlayLaw::ALL.map(|law| {
+            let (_, mut left) = sampled.of(law, [0.0; 4], false);
+            let penalty = if law == PlayLaw::Smooth { FAR_LESS } else { 1.0 };
+            left.iter_mut().for_each(|left| *left /= penalty);
+            (std::array::from_fn(|_| 0.0), left)
+        });
+        least(&by_law, None).clone()
+    };
+    let as_stated = leaves(stated);
+    let tried = FRICTIONS.map(|share| (share * of, leaves(share * of)));
+    let Some((n_m, best)) = tried.iter().min_by(|a, b| sum(&a.1, None).total_cmp(&sum(&b.1, None))) else { return };
+    let left = sum(best, None) / sum(&as_stated, None);
+    // A load that nobody read changes the flank elsewhere, too.
+    let sampled = Sampled::new(&rows, (nominal, table));
+    let rivals = || sampled.tried(PlayLaw::Held, [0.0; 4], CONSTANT.start..RIVALS.end);
+    if left <= 1.0 - LEAST_GAIN
+        && is_certain(&as_stated, best, GAIN_CERTAIN)
+        && sum(best, None) < sum(least(&rivals(), None), None)
+    {
+        recording.notes.push(format!(
+            "the output changes its flank at a load of about {n_m:.2} N·m, where the model states a friction of \
+             {stated:.2}: with that {:.0} % less is left, and it takes its place",
+            100.0 * (1.0 - left)
+        ));
+        nominal.friction_torque_n_m = *n_m;
+    }
+}
+
 /// Finds a zero of the torque, where it is distinguished from none and from loads that follow the output or the motion,
 /// names it and takes it off.
 pub(super) fn check_zero(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) {
-    let share = FOLLOWED as f64 / recording.sessions.iter().map(Session::len).sum::<usize>() as f64;
-    let begun = |session: &Session| session.part(0..(share.min(1.0) * session.len() as f64) as usize);
-    let rows = Rows::new(&recording.sessions.iter().map(begun).collect::<Vec<Session>>(), nominal);
-    if !rows.recorded.torque || nominal.wind_up_arcsec(1.0) == 0.0 || rows.count_used() < SAMPLE / 4 {
-        return;
-    }
+    let Some(rows) = followed(recording, nominal) else { return };
     let sampled = Sampled::new(&rows, (nominal, table));
     // A zero turns flanks over too early, which by itself looks like a play that goes over slowly.
     let by_law = PlayLaw::ALL.map(|law| (law, sampled.tried(law, [0.0; 4], CONSTANT)));
@@ -746,6 +797,23 @@ mod tests {
         assert_eq!(zero_checked(|_, _| 0.0).0, None);
         assert_eq!(zero_checked(|output, _| 3.0 * (output + 0.4).sin()).0, None);
         assert_eq!(zero_checked(|_, direction| -0.9 * direction).0, None);
+    }
+
+    #[test]
+    fn a_friction_of_the_play_other_than_stated_is_that_of_the_rows_and_an_unbalanced_load_is_none() {
+        let nominal = catalogue_drive();
+        let of_rows = |stated: f64, unseen: fn(f64, f64) -> f64| {
+            let mut recording = to_and_fro(&nominal, 0.08, unseen);
+            let mut other = Nominal { friction_torque_n_m: stated, ..nominal.clone() };
+            take_friction(&mut recording, &mut other, None);
+            other.friction_torque_n_m
+        };
+        for stated in [0.6, 3.4] {
+            let found = of_rows(stated, |_, _| 0.0);
+            assert!((found / nominal.friction_torque_n_m - 1.0).abs() < 0.25, "{stated}: {found}");
+        }
+        assert_eq!(of_rows(1.5, |_, _| 0.0), 1.5);
+        assert_eq!(of_rows(1.5, |output, _| 3.0 * (output + 0.4).sin()), 1.5);
     }
 
     #[test]

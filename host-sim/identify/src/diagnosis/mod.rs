@@ -48,9 +48,9 @@ use flexspline::Table;
 use thiserror::Error;
 
 use crate::causes::CauseName;
-use crate::measurement::Session;
+use crate::measurement::{Fault, Session};
 use crate::nominal::Nominal;
-use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
+use candidate::{Excitation, Label, Law, LawUnits, index_step, library, line, unnamed};
 pub use explain::Explanation;
 pub(crate) use extended::nominal_arcsec;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
@@ -93,6 +93,8 @@ pub struct Settings<'a> {
     pub asked: Option<CauseName>,
     /// Causes that are not considered: somebody knows that they are not there, or wants to see what the rows say then.
     pub without: &'a [CauseName],
+    /// Faults of the data of which something was taken out of the error: how much of it was there is fitted.
+    pub faults: &'a [Fault],
 }
 
 /// How finely rows are looked at, and the noise in them.
@@ -108,7 +110,7 @@ pub struct Fineness {
 
 impl Default for Settings<'_> {
     fn default() -> Self {
-        Settings { pitch_radius_mm: 48.7, asked: None, without: &[] }
+        Settings { pitch_radius_mm: 48.7, asked: None, without: &[], faults: &[] }
     }
 }
 
@@ -132,7 +134,7 @@ pub fn diagnose(
     settings: &Settings<'_>,
     mut progress: impl FnMut(usize, usize, &str),
 ) -> Result<(Diagnosis, Extended), DiagnosisError> {
-    let rows = Rows::new(sessions, nominal);
+    let rows = Rows::new(sessions, nominal).with_taken_out(settings.faults, sessions);
     check(&rows)?;
     progress(0, 4, "nominal model");
     let (base, jumps) = prepare::base(&rows, nominal, table);
@@ -250,6 +252,7 @@ impl<'a> Search<'a> {
                         slow.push(line);
                     }
                 }
+                let step = remainder::step(&problem, &selected, noise).map(|(session, at)| index_step(session, at));
                 explained = remainder::explained(&problem, &selected);
                 // What hung once hung, whatever is taken for it later.
                 for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained, noise.white)) {
@@ -261,9 +264,11 @@ impl<'a> Search<'a> {
                 let hangs = pairs().zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
                 other_rows = hangs || pairs().filter(|(a, b)| a != b).count() > on.rows.len() / 200;
                 uncertain = doubtful;
-                new_line = !slow.is_empty();
+                let step = step.filter(|step| laws.iter().all(|law| law.label != step.label));
+                let more: Vec<Law> = slow.iter().map(|found| line(found.per, found.order)).chain(step).collect();
+                new_line = !more.is_empty();
                 if new_line {
-                    laws.extend(slow.iter().map(|found| line(found.per, found.order)));
+                    laws.extend(more);
                     free = None;
                 }
             }

@@ -279,7 +279,7 @@ pub struct Diagnosed {
 }
 
 /// Reads rows, takes away what the model knows already, and averages rows that are too many: `bytes` of a file called
-/// `file`.
+/// `file`. The friction of the play that the rows show takes the place of the subject's.
 ///
 /// # Errors
 /// The rows cannot be read, or do not fit what the model knows.
@@ -287,7 +287,7 @@ pub fn parse_rows(
     file: &str,
     bytes: impl Into<Vec<u8>>,
     columns: &ColumnMap,
-    subject: &Subject<'_>,
+    subject: &mut Subject<'_>,
 ) -> Result<Recording, PipelineError> {
     let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
     recording.notes.extend(subject.note.clone());
@@ -303,9 +303,13 @@ pub fn parse_rows(
     let (nominal, table) = subject.against();
     channels::check_degrees(&recording, columns, nominal)?;
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
-    // The zero is where the output changes its flank, if it is known how friction shifts that.
-    if recording.unusable.is_none() && (table.is_some() || nominal.friction_torque_n_m > 0.0) {
-        channels::check_zero(&mut recording, nominal, table);
+    if recording.unusable.is_none() {
+        channels::take_friction(&mut recording, &mut subject.nominal, subject.table.as_ref());
+        // The zero is where the output changes its flank, if it is known how friction shifts that.
+        let (nominal, table) = subject.against();
+        if table.is_some() || nominal.friction_torque_n_m > 0.0 {
+            channels::check_zero(&mut recording, nominal, table);
+        }
     }
     recording.average_to(MOST_ROWS);
     Ok(recording)
@@ -322,11 +326,15 @@ pub fn diagnose_rows(
     settings: &Settings<'_>,
     mut progress: impl FnMut(usize, usize, &str),
 ) -> Result<Diagnosed, PipelineError> {
-    let settings = Settings { pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(), ..*settings };
+    let pitch_radius_mm = subject.drive.circular_spline.pitch_radius_mm();
+    let faults = recording.faults.clone();
+    let settings = Settings { pitch_radius_mm, faults: &faults, ..*settings };
     let (nominal, table) = subject.against();
     let (mut diagnosis, extended) =
         diagnose(&recording.sessions, nominal, table, &settings, |done, of, what| progress(done, of + 1, what))?;
+    zeros::judge_taken_out(&mut recording, &diagnosis.recalibrated);
     zeros::tell(&mut recording, &diagnosis.zeros);
+    diagnosis.fitted_faults.iter().for_each(|fault| zeros::tell_fitted(&mut recording, fault));
     if recording.unusable.is_some() {
         // What makes them unusable is a channel that had to be left out.
         let masked = |fault: &&Fault| fault.treatment == Treatment::Masked && fault.channel == Some(Quantity::Torque);
@@ -572,7 +580,7 @@ mod tests {
     fn found(error_arcsec: impl Fn(f64) -> f64) -> (Finding, Vec<String>, String) {
         let nominal = catalogue_drive();
         let model = Model { nominal: nominal.clone(), causes: Vec::new() };
-        let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
+        let mut subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
         let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
         let mut random = fastrand::Rng::with_seed(5);
         for k in 0..1800 {
@@ -581,7 +589,7 @@ mod tests {
             let error = load + error_arcsec(psi) + 2.0 * (random.f64() - 0.5);
             text += &format!("{:.2},{psi:.6},{error:.4},12\n", 0.01 * f64::from(k));
         }
-        let recording = parse_rows("gear.csv", text.as_bytes(), &ColumnMap::default(), &subject).unwrap();
+        let recording = parse_rows("gear.csv", text.as_bytes(), &ColumnMap::default(), &mut subject).unwrap();
         let done = diagnose_rows(recording, &subject, &Settings::default(), |_, _, _| {}).unwrap();
         (done.diagnosis.finding, done.recording.notes.clone(), done.diagnosis.text())
     }
@@ -616,11 +624,11 @@ mod tests {
             text += &format!("{:.2},{psi:.6},{error:.4},{load:.4}\n", 0.01 * f64::from(k));
         }
         let (drive, columns) = ((Drive::hhd_95(), GeneratorKind::Cam), ColumnMap::default());
-        let subject = Subject::of_ratio(95.0, drive, ("gear.csv", text.clone().into_bytes(), &columns)).unwrap();
+        let mut subject = Subject::of_ratio(95.0, drive, ("gear.csv", text.clone().into_bytes(), &columns)).unwrap();
         let spring = |of: &Nominal| of.wind_up_arcsec(25.0) - of.wind_up_arcsec(10.0);
         let (found, true_one) = (spring(&subject.nominal), spring(&nominal));
         assert!((found / true_one - 1.0).abs() < 0.05, "{found} for {true_one}");
-        let rows = parse_rows("gear.csv", text.as_bytes(), &columns, &subject).unwrap();
+        let rows = parse_rows("gear.csv", text.as_bytes(), &columns, &mut subject).unwrap();
         let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
         assert_eq!(done.diagnosis.causes, [], "{}", done.diagnosis.text());
         let note = "2 and 4 waves in a turn of the generator, of 30.0 and 0.0 arcsec, count as the gear's own";

@@ -10,6 +10,7 @@ use super::report::Unexplained;
 use super::rows::{Rows, combined, rms};
 use super::select::{self, Selected, less};
 use super::thresholds::remainder::*;
+use crate::measurement::STEP_AGREES;
 use crate::residual::{is_no_noise, strongest};
 
 /// Highest order per generator turn up to which lines are looked for. *Guess*: above what bearings make, below the
@@ -72,6 +73,41 @@ pub(crate) fn lines(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
     let in_time = || line(Per::Second, SLOWEST_LINE_HZ, 0.5 / rows.period);
     let (by_angle, in_time) = rayon::join(by_angle, || rows.recorded.time.then(in_time).flatten());
     by_angle.into_iter().chain(in_time).collect()
+}
+
+/// Rows to either side of a step, at least. *Guess*: means of a quarter of the noise of a row.
+const BESIDE_A_STEP: usize = 16;
+/// A step within one row is this many standard deviations of the white noise. *Guess*: one more than the five by which
+/// causes are separated.
+const SEEN_OF_A_STEP: f64 = 6.0;
+
+/// Where the residual steps most from one row to the next, both of which count, and stays until the session ends: the
+/// session, and when in it, s.
+#[must_use]
+pub(crate) fn step(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Option<(usize, f64)> {
+    let (rows, uncertain) = (problem.on.rows, &problem.uncertain);
+    let left = problem.on.left(&explained(problem, selected));
+    let counts = |k: usize| f64::from(u8::from(!uncertain[k]));
+    let mut strongest: Option<(f64, usize, usize)> = None;
+    for (number, session) in rows.sessions.iter().enumerate().filter(|(number, _)| rows.used[*number]) {
+        let all = session.clone().map(|k| [counts(k), counts(k) * left[k]]);
+        let [count, sum] = all.fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+        let [mut before, mut sum_before] = [0.0; 2];
+        for k in session.clone() {
+            let after = count - before;
+            if before.min(after) >= BESIDE_A_STEP as f64 && !uncertain[k] && !uncertain[k - 1] {
+                let size = (sum - sum_before) / after - sum_before / before;
+                let sharp = (left[k] - left[k - 1] - size).abs() < STEP_AGREES * size.abs() + 4.0 * noise.white;
+                let strength = size * size * before * after / count;
+                if sharp && size.abs() > SEEN_OF_A_STEP * noise.white && strongest.is_none_or(|of| strength > of.0) {
+                    strongest = Some((strength, number, k));
+                }
+            }
+            before += counts(k);
+            sum_before += counts(k) * left[k];
+        }
+    }
+    strongest.map(|(_, number, k)| (number, rows.since[k]))
 }
 
 /// The angle of each row in which a line repeats, rad; a second is a turn.

@@ -9,6 +9,7 @@ use super::thresholds::verdict::LEAST_GAIN_OF_A_NAME;
 use super::trace::Trace;
 use crate::causes::{CauseName, ParameterName};
 use crate::extension::Evaluation;
+use crate::measurement::FaultName;
 
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -204,6 +205,19 @@ pub struct Unexplained {
     pub size_arcsec: f64,
 }
 
+/// A fault of the data as it was fitted beside the causes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedFault {
+    /// Its name.
+    pub name: FaultName,
+    /// Session in which it begins, from 0.
+    pub session: usize,
+    /// When in that, s.
+    pub since_s: f64,
+    /// A step, arcsec, or a drift, arcsec/h.
+    pub size: Parameter,
+}
+
 /// The result of a diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -242,6 +256,9 @@ pub struct Diagnosis {
     /// fault of the data.
     #[serde(skip)]
     pub zeros: Vec<Parameter>,
+    /// Faults of the data that were found beside the causes. Told with those.
+    #[serde(skip)]
+    pub fitted_faults: Vec<FittedFault>,
     /// Why the rows that are left to judge by say nothing of the unit, where too many had to be set aside.
     #[serde(skip)]
     pub set_aside: Option<String>,

@@ -8,8 +8,8 @@ use super::candidate::{Label, Law, Per, standing_pitch_error};
 use super::model::{Problem, Term, but};
 use super::noise::Noise;
 use super::report::{
-    Cause, Compensation, Diagnosis, EvidenceBy, Finding, HeldOut, Hint, Parameter, Residual, SetOfCauses, Unexplained,
-    Verdict,
+    Cause, Compensation, Diagnosis, EvidenceBy, Finding, FittedFault, HeldOut, Hint, Parameter, Residual, SetOfCauses,
+    Unexplained, Verdict,
 };
 use super::rows::rms;
 use super::select::{self, Selected, Standing, standings};
@@ -19,6 +19,7 @@ use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
 use super::{Search, Settings, experiment, held_out, remainder, rivals, with_speed};
 use crate::causes::{CauseName, Kin, ParameterName};
+use crate::measurement::FaultName;
 use crate::nominal::{Nominal, OF_TWO_LOBES};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -43,7 +44,8 @@ pub(super) fn conclude(
     // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or
     // without a cause.
     let zeros = zeros_of_sessions(problem, selected);
-    let of_the_bench = |term: &Term<'_>| term.law.is_zero_of_sessions() && !zeros.is_empty();
+    let of_the_bench =
+        |term: &Term<'_>| term.law.is_of_the_data() && (!term.law.is_zero_of_sessions() || !zeros.is_empty());
     let given: Vec<Term<'_>> = selected.terms.iter().filter(|term| of_the_bench(term)).cloned().collect();
     let before = Selected::of(problem, given).map_or(Vec::new(), |given| remainder::left(problem, &given));
     let after = remainder::left(problem, selected);
@@ -75,7 +77,7 @@ pub(super) fn conclude(
         named.is_empty() && selected.terms.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
-    let without_name = |k: usize| !named.contains(&k) && !only_hints(k) && !selected.terms[k].law.is_zero_of_sessions();
+    let without_name = |k: usize| !named.contains(&k) && !only_hints(k) && !selected.terms[k].law.is_of_the_data();
     let significant_left = !left_over.is_empty() || (0..selected.terms.len()).any(without_name) || zeros_alone;
     // What does not predict sessions it was not fitted to, better than the adapted model and than none, is no
     // explanation.
@@ -195,6 +197,7 @@ pub(super) fn conclude(
         wander_correlation_s: noise.correlation_s,
         next_experiment,
         experiment_for_asked,
+        fitted_faults: fitted_faults(problem, selected),
         zeros,
         set_aside: None,
         trace,
@@ -253,6 +256,22 @@ fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Para
     if is_another_one(&zeros) { zeros } else { Vec::new() }
 }
 
+/// Faults of the data that were chosen among the causes.
+fn fitted_faults(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<FittedFault> {
+    let covariance = selected.fit.solution.covariance();
+    let of = |(k, term): (usize, &Term<'_>)| {
+        let Label::Fault { name, session, since_s } = term.law.label else { return None };
+        let at = selected.fit.starts[k];
+        let (value, variance) =
+            (selected.fit.of(k)[0], covariance[at * (selected.fit.solution.coefficients.len() + 1)]);
+        // The column of a drift is a share of all the time.
+        let per = if name == FaultName::Drift { 3600.0 / problem.on.scales.duration_s } else { 1.0 };
+        let size = Parameter { value: value * per, std: variance.max(0.0).sqrt() * per };
+        Some(FittedFault { name, session, since_s, size })
+    };
+    selected.terms.iter().enumerate().filter_map(of).collect()
+}
+
 /// Whether the zero of a session is known to be another one: what the laws leave may pass for one that is hardly there.
 fn is_another_one(zeros: &[Parameter]) -> bool {
     zeros.iter().any(|zero| zero.value.abs() > SIZE_KNOWN * zero.std)
@@ -284,7 +303,7 @@ fn unnamed(
 ) -> Vec<(Option<Label>, f64)> {
     let terms = selected.terms.iter().zip(standings);
     let terms = terms
-        .filter(|(term, _)| !term.law.named() && !term.law.is_zero_of_sessions())
+        .filter(|(term, _)| !term.law.named() && !term.law.is_of_the_data())
         .map(|(term, standing)| (Some(term.law.label), standing.size));
     let hidden = |called: &str| hidden_lines.iter().find(|line| line.to_string() == called).copied();
     terms.chain(left_over.iter().map(|left| (hidden(&left.looks_like), left.size_arcsec))).collect()

@@ -82,7 +82,7 @@ pub(super) fn order_of(label: Label, known: Option<&Known>) -> Option<f64> {
             let of = |name: ParameterName| known?.parameters.get(name.as_str()).map(|parameter| parameter.value);
             (of(ParameterName::Encoder) == Some(0.0)).then(|| of(ParameterName::Harmonic)).flatten()
         }
-        Label::Cause(_) | Label::Line { .. } | Label::Like(_) => None,
+        Label::Cause(_) | Label::Line { .. } | Label::Like(_) | Label::Fault { .. } => None,
     }
 }
 

@@ -26,6 +26,7 @@ pub(crate) use columns::MappedColumn;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 use faults::clock::SESSION_GAP_PERIODS;
+pub(crate) use faults::steps::AGREES as STEP_AGREES;
 pub(crate) use faults::{LineFit, throughout};
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,

@@ -2,11 +2,13 @@
 //! cause is named for it.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use super::geometry::{Angle, waves};
 use super::stiffness::follow;
-use super::{Excitation, Label, Law, Per, Shape, Tag, by_row, main, times};
+use super::{Excitation, Label, Law, Per, Shape, Shaped, Tag, by_row, main, times};
 use crate::causes::ParameterName as Name;
+use crate::measurement::FaultName;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
@@ -74,9 +76,34 @@ fn zero_of_each_session() -> Law {
         on.rows.sessions_used().skip(1).map(|session| main(of(&session), 20.0)).collect()
     });
     law.wrong.foretells = false;
-    // It is measured, not modelled.
+    measured(law)
+}
+
+/// What is measured, not modelled: it is wrong by nothing.
+fn measured(mut law: Law) -> Law {
     law.wrong.misfit = 0.0;
     law
+}
+
+/// Spread of a fault of the data before the rows say anything, arcsec. *Guess*: beyond a few hundred nobody takes it for
+/// the drive.
+const OF_A_FAULT: f64 = 300.0;
+
+/// A fault of the data that adds this to the error.
+fn fault(
+    (name, session, since_s): (FaultName, usize, f64),
+    values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static,
+) -> Law {
+    let column = move |on: &Excitation<'_>, _: Shaped<'_>| vec![main(by_row(on, |k| values(on, k)), OF_A_FAULT)];
+    measured(Law::new(Label::Fault { name, session, since_s }, column))
+}
+
+/// An index that an encoder lost so long after a session began: the error has another zero from there on.
+pub fn index_step(session: usize, since_s: f64) -> Law {
+    fault((FaultName::EncoderIndexJump, session, since_s), move |on, k| {
+        let Range { start, end } = on.rows.sessions[session];
+        f64::from(u8::from(k >= start && (k >= end || on.rows.since[k] >= since_s)))
+    })
 }
 
 /// A line at any order of an angle or of time: `per` is what it is counted against.
@@ -107,10 +134,9 @@ type Offset = fn(&Excitation<'_>, usize) -> f64;
 #[must_use]
 pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     let (warm, timed, loaded) = (on.rows.recorded.temperature, on.rows.recorded.time, on.scales.load > 0.0);
-    let offsets: [(bool, &'static str, Offset); 13] = [
+    let offsets: [(bool, &'static str, Offset); 12] = [
         (warm, "offset with temperature", warmer),
         (warm, "offset with temperature squared", |on, k| warmer(on, k).powi(2)),
-        (timed, "offset with time", since_begin),
         (timed, "creep since the session began (logarithm)", |on, k| (1.0 + on.rows.since[k]).ln()),
         (timed, "settling since the session began (exponential, 20 s)", |on, k| (-on.rows.since[k] / 20.0).exp()),
         (timed, "offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()),
@@ -124,6 +150,10 @@ pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     ];
     let offsets = offsets.into_iter().filter(|(there, ..)| *there).map(|(_, name, values)| law(name, values));
     let mut laws: Vec<Law> = offsets.chain([lash_before_the_generator()]).collect();
+    if timed {
+        // Of all the time, as a share.
+        laws.push(fault((FaultName::Drift, 0, 0.0), |on, k| since_begin(on, k) / on.scales.duration_s));
+    }
     if on.rows.sessions_used().count() > 2 {
         laws.push(zero_of_each_session());
     }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::causes::{CauseName, Kin};
+use crate::measurement::FaultName;
 
 /// The subject of a law.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +19,15 @@ pub enum Label {
     },
     /// A deviation without a cause, in the words of a report.
     Like(&'static str),
+    /// A fault of the data, from some time of a session on, s.
+    Fault {
+        /// Its name.
+        name: FaultName,
+        /// The session, from 0.
+        session: usize,
+        /// Since its begin.
+        since_s: f64,
+    },
 }
 
 /// The turn or the time that the order of a line is counted in.
@@ -36,6 +46,9 @@ impl fmt::Display for Label {
         let (order, per) = match self {
             Label::Cause(cause) => return cause.fmt(f),
             Label::Like(text) => return f.pad(text),
+            Label::Fault { name, session, since_s } => {
+                return f.pad(&format!("{} from {since_s} s of session {} on", name.as_str(), session + 1));
+            }
             Label::Line { per: Per::GeneratorTurn, order } => (order, "generator turn"),
             Label::Line { per: Per::OutputTurn, order } => (order, "output turn"),
             Label::Line { per: Per::Second, order } => (order, "second"),
@@ -69,7 +82,7 @@ impl Label {
     pub const fn cause(self) -> Option<CauseName> {
         match self {
             Label::Cause(cause) => Some(cause),
-            Label::Line { .. } | Label::Like(_) => None,
+            Label::Line { .. } | Label::Like(_) | Label::Fault { .. } => None,
         }
     }
 

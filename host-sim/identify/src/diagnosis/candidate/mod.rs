@@ -38,7 +38,7 @@ use flexspline_base::robust::least_and_most;
 use flexspline_design::kernels::Kernels;
 
 pub(crate) use among::{Acting, Among, Zones, added, left_by, together};
-pub(crate) use generic::{line, maps, unnamed};
+pub(crate) use generic::{index_step, line, maps, unnamed};
 pub(crate) use geometry::standing_pitch_error;
 pub(crate) use label::{Label, Per};
 pub use named::{Coefficients, Shaped, Tag};
@@ -476,6 +476,10 @@ impl Law {
     #[must_use]
     pub(crate) const fn is_zero_of_sessions(&self) -> bool {
         !self.wrong.foretells
+    }
+    /// Whether it is told of the data, and says nothing of the drive.
+    pub(crate) const fn is_of_the_data(&self) -> bool {
+        matches!(self.label, Label::Fault { .. }) || self.is_zero_of_sessions()
     }
     /// Whether it is about this cause.
     #[must_use]

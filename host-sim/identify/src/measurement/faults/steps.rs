@@ -27,7 +27,7 @@ const STANDS_OUT: f64 = 8.0;
 const LASTS: f64 = 8.0;
 /// The lasting part and the sudden part agree within this share. *Guess*: clearance that is crossed, or ripple, differs
 /// by all of it.
-const AGREES: f64 = 0.4;
+pub(crate) const AGREES: f64 = 0.4;
 /// A step is taken back by one of the other sign that differs by less than this share. *Chosen* (0.2 before) with
 /// `a_flank_that_friction_lets_go_is_no_lost_index`.
 const TAKEN_BACK: f64 = 0.35;
