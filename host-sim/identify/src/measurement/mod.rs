@@ -279,18 +279,10 @@ pub(crate) fn parse_at_least(
     rollover::unwrap(&mut log, &columns, gear.ratio, &mut findings.notes);
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &columns, gear, &mut findings).map_err(refuse)?;
-    // A drift over long gaps looks like other zeros.
-    let drifts = faults::leaps::has_other_zeros(&log, gear)
-        && faults::drift::slope(&log.clone().with_error(gear.ratio), gear).is_some();
-    if !drifts {
-        faults::leaps::between_sessions(&mut log, gear, &mut findings);
-    }
+    faults::leaps::between_sessions(&mut log, gear, &mut findings);
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut log = log.with_error(gear.ratio);
     findings.notes.extend(many_sessions(&log));
-    if drifts {
-        faults::drift::check(&mut log, gear, &mut findings);
-    }
     faults::held::check(&mut log, gear, &mut findings);
     faults::frozen::check(&mut log, gear, &mut findings).map_err(refuse)?;
     faults::held::check_coarse_torque(&mut log, &mut findings);
@@ -298,10 +290,6 @@ pub(crate) fn parse_at_least(
     faults::outliers::check(&mut log, gear, &mut findings);
     faults::resolution::check(&mut log, gear, &mut findings);
     faults::steps::check(&mut log, gear, &mut findings);
-    // Steps that stay in the data look like drift.
-    if findings.tooth_steps.is_empty() && !drifts {
-        faults::drift::check(&mut log, gear, &mut findings);
-    }
     let mut sessions = log.into_sessions();
     // Each session of a guide log, whose columns nobody maps, has its own zero.
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= columns.is_empty());

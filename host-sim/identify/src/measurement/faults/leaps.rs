@@ -185,13 +185,6 @@ fn error_of(log: &Log, gear: &Gear) -> Option<Vec<f64>> {
     Some(rows.map(|(output, psi)| output - psi / gear.ratio).collect())
 }
 
-/// Whether a session begins with another zero, by no whole turns of the generator.
-pub(in crate::measurement) fn has_other_zeros(log: &Log, gear: &Gear) -> bool {
-    let sessions: Vec<Range<usize>> = log.sessions().collect();
-    let other = |error: Vec<f64>| between(&sessions).any(|(_, change)| change(&error).abs() > OTHER_ZERO_RAD);
-    error_of(log, gear).is_some_and(other)
-}
-
 /// Whether the error grows with the angle within sessions, beyond what a drive does.
 fn grows(generator: &[f64], error: &[f64], sessions: &[Range<usize>]) -> bool {
     let of = |(turned, changed): (f64, f64)| (turned > TAU).then_some(changed / turned);

@@ -28,11 +28,9 @@
 //! | another zero from a session on | the zero of that session is fitted on its own |
 //! | angles read at different instants | rows weigh what their speed leaves of them; rows read far apart left out |
 //! | index jump | step taken out |
-//! | drift | straight line in time taken out |
 //! | coarse resolution of an angle or of the torque, implausible time | named |
 
 pub(super) mod clock;
-pub(super) mod drift;
 pub(super) mod frozen;
 pub(super) mod held;
 pub(super) mod leaps;

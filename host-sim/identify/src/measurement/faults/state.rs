@@ -59,8 +59,6 @@ pub(super) struct StateFit {
     pub value: Vec<f64>,
     /// Their standard deviations, correlation of neighbouring rows considered.
     pub std: Vec<f64>,
-    /// Standard deviation of a coefficient whose column has size one and is like no other.
-    pub unit_std: f64,
     /// Sum of squared, weighted residuals.
     pub misfit: f64,
 }
@@ -200,6 +198,6 @@ impl<'a> StateModel<'a> {
         let misfit = left.iter().zip(&weight).map(|(left, weight)| weight * left * left).sum();
         let variances = solution.covariance().into_iter().step_by(all.len() + 1);
         let std = variances.map(|variance| sigma * (inflation * variance).sqrt()).collect();
-        Some(StateFit { value: solution.coefficients, std, unit_std: sigma * (inflation / n as f64).sqrt(), misfit })
+        Some(StateFit { value: solution.coefficients, std, misfit })
     }
 }
