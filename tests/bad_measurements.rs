@@ -277,7 +277,7 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
         (
             "a zero that drifts",
             changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC)),
-            Abstains,
+            Faults(&["drift"]),
         ),
         ("torque dead", changed(|b| b.torque().fill(0.0)), Abstains),
     ];

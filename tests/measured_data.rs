@@ -119,9 +119,7 @@ enum Ends {
 }
 
 use Ends::{Error, Faults};
-use FaultName::{
-    ClockError, Drift, EncoderIndexJump, FrozenChannel, MissingSamples, Outliers, Quantisation, UnitMismatch,
-};
+use FaultName::{ClockError, EncoderIndexJump, FrozenChannel, MissingSamples, Outliers, Quantisation, UnitMismatch};
 
 /// The plain drive with some rows of its file changed: number of the row from 0, its fields.
 fn edited(change: impl Fn(usize, &mut Vec<String>)) -> Vec<u8> {
@@ -416,11 +414,6 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
             changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a / 0.005).round() * 0.005)),
             Faults(&[Quantisation]),
         ),
-        (
-            "a zero that drifts",
-            changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC)),
-            Faults(&[Drift]),
-        ),
         // Two at once.
         (
             "NaN, an index lost, kelvin",
@@ -495,10 +488,6 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
     let kelvin = read(&changed(|b| shifted(b.temperature(), 273.15))).unwrap();
     assert!(kelvin.sessions[0].temperature_c.is_none() && kelvin.sessions[0].error_rad == clean.error_rad);
     assert!(kelvin.faults[0].what.contains("temperature=temperature_c:K"), "{:?}", kelvin.faults);
-    // A drift: its size, and gone.
-    let text = changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC));
-    let fault = &read(&text).unwrap().faults[0];
-    assert!((fault.size_arcsec.unwrap() - 32.0).abs() < 4.0, "{fault:?}");
     // Frozen rows are left out, by their lines.
     let frozen = read(&changed(|b| frozen(&mut b.output_rad, 1500..1620))).unwrap();
     assert_eq!((frozen.faults[0].first_line, frozen.faults[0].rows, frozen.sessions[0].len()), (1502, 120, 3880));
@@ -519,7 +508,7 @@ fn a_drive_that_ratchets_is_the_drive_and_not_an_encoder() {
 }
 
 #[test]
-fn teeth_that_slide_twice_are_no_drift_of_the_zero() {
+fn teeth_that_slide_twice_are_no_lost_index() {
     let pitch = std::f64::consts::TAU / 190.0;
     let slide = |rows: usize| pitch * (1.0 - (-(rows as f64) / 8.0).exp());
     let text = changed(|b| {
@@ -534,7 +523,7 @@ fn teeth_that_slide_twice_are_no_drift_of_the_zero() {
 }
 
 #[test]
-fn teeth_that_slip_between_two_recordings_are_no_drift_of_the_zero() {
+fn teeth_that_slip_between_two_recordings_are_no_other_zero() {
     let pitch = std::f64::consts::TAU / 190.0;
     let text = changed(|b| {
         for k in 0..b.rows() {

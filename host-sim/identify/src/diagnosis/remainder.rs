@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
+use super::base::WIDER;
 use super::candidate::{Acting, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
@@ -85,7 +86,11 @@ const SEEN_OF_A_STEP: f64 = 6.0;
 /// session, and when in it, s.
 #[must_use]
 pub(crate) fn step(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Option<(usize, f64)> {
-    let (rows, uncertain) = (problem.on.rows, &problem.uncertain);
+    let (on, rows, uncertain) = (problem.on, problem.on.rows, &problem.uncertain);
+    // Where no load says which flank carries, one as wide as the clearance may be a change of flank.
+    let unknown =
+        if on.scales.load > on.nominal.friction_torque_n_m { 0.0 } else { 2.0 * WIDER * on.base.half_backlash };
+    let least = unknown.max(SEEN_OF_A_STEP * noise.white);
     let left = problem.on.left(&explained(problem, selected));
     let counts = |k: usize| f64::from(u8::from(!uncertain[k]));
     let mut strongest: Option<(f64, usize, usize)> = None;
@@ -99,7 +104,7 @@ pub(crate) fn step(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise)
                 let size = (sum - sum_before) / after - sum_before / before;
                 let sharp = (left[k] - left[k - 1] - size).abs() < STEP_AGREES * size.abs() + 4.0 * noise.white;
                 let strength = size * size * before * after / count;
-                if sharp && size.abs() > SEEN_OF_A_STEP * noise.white && strongest.is_none_or(|of| strength > of.0) {
+                if sharp && size.abs() > least && strongest.is_none_or(|of| strength > of.0) {
                     strongest = Some((strength, number, k));
                 }
             }
