@@ -8,7 +8,6 @@ use std::path::Path;
 use flexspline::{GeneratorAngle, PlayState, Prediction, Quality, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use thiserror::Error;
 
 use crate::calibrate::{INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
 use crate::extension::{left_by_core, less, without_zero};
@@ -145,13 +144,21 @@ impl RowsOf {
     ///
     /// # Errors
     /// They are not, or the table names no generator that is simulated.
-    pub fn check(&self, table: &Table<'_>) -> Result<(), Box<OtherRows>> {
+    pub fn check(&self, table: &Table<'_>) -> Result<(), String> {
         let hash = blake3::Hash::from(table.drive_hash()).to_hex().to_string();
         let generator = generator_of(table).map_or_else(|| "an unknown generator".to_owned(), |kind| kind.to_string());
         if (hash.as_str(), generator.as_str()) == (self.drive_hash.as_str(), self.generator.as_str()) {
             return Ok(());
         }
-        Err(Box::new(OtherRows { rows: self.clone(), hash, generator, ratio: table.drive().exact_ratio() }))
+        Err(format!(
+            "the rows are of the drive {} (BLAKE3 {}) under {}, according to {} next to them; the table is of a drive \
+             with ratio {} and BLAKE3 {hash} under {generator}",
+            self.drive,
+            self.drive_hash,
+            self.generator,
+            RESULTS[1],
+            table.drive().exact_ratio()
+        ))
     }
 }
 
@@ -164,7 +171,7 @@ impl ReplaySummary {
     pub fn of_rows(&mut self, rows_of: Option<RowsOf>, table: &Table<'_>) {
         self.remarks = match &rows_of {
             None => vec![OF_NOBODY.to_owned()],
-            Some(rows) => rows.check(table).err().iter().map(ToString::to_string).collect(),
+            Some(rows) => rows.check(table).err().into_iter().collect(),
         };
         self.remarks.extend(self.of_gain());
         self.rows_of = rows_of;
@@ -203,19 +210,6 @@ impl ReplaySummary {
         };
         (!why.is_empty()).then(|| says(why.join("; or "))).into_iter().collect()
     }
-}
-
-/// Rows and a table that do not belong together.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[error(
-    "the rows are of the drive {} (BLAKE3 {}) under {}, according to {} next to them; the table is of a drive with \
-     ratio {ratio} and BLAKE3 {hash} under {generator}", rows.drive, rows.drive_hash, rows.generator, RESULTS[1]
-)]
-pub struct OtherRows {
-    rows: RowsOf,
-    hash: String,
-    generator: String,
-    ratio: f64,
 }
 
 /// Rows of a log, with what was found in it.

@@ -21,8 +21,8 @@ use super::noise::white_level;
 use super::rows::{Rows, mean, quantile, rms, robust_std};
 use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, MeasuredError, Measures, Quantity, Recording, Refusal, Session, Treatment,
-    least_and_most, throughout,
+    ColumnMap, Fault, FaultName, MeasuredError, Measures, Quantity, Recording, Session, Treatment, least_and_most,
+    other_reading, throughout,
 };
 use crate::nominal::Nominal;
 use flexspline_base::robust::dot;
@@ -579,7 +579,7 @@ pub(crate) fn check_degrees(
         format!("--columns generator={generator}:deg,output={output}:deg"),
         format!("--columns generator={generator}:rad,output={output}:rad if they are not"),
     ];
-    Err(MeasuredError::of_file(&recording.file, &Refusal::OtherReading { seen, why, readings }))
+    Err(MeasuredError::of_file(&recording.file, &other_reading(&seen, why, &readings)))
 }
 
 #[cfg(test)]

@@ -16,12 +16,9 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use serde::Serialize;
-use thiserror::Error;
 
 use crate::measurement::raw::RawFile;
-use crate::measurement::{
-    APART, MappedColumn, Quantity, ReadRows, Reading, Unit, WrongReading, continued, median_of, sampled,
-};
+use crate::measurement::{APART, MappedColumn, Quantity, ReadRows, Reading, Unit, continued, median_of, sampled};
 use column::Facts;
 pub(crate) use coverage::Coverage;
 use pair::pair;
@@ -242,35 +239,19 @@ fn used(guesses: &[Guess], role: Role) -> Option<&Guess> {
     guesses.iter().find(|guess| guess.serves_as(role))
 }
 
-/// Why files cannot be looked at together.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum LookError {
-    /// There is none.
-    #[error("no file")]
-    NoFile,
-    /// Names of two files, each with the names of its columns.
-    #[error(
-        "{} has the columns {}, but {} has {}; allowed: logs of one form together",
-        .other.0, .other.1, .first.0, .first.1
-    )]
-    OtherColumns {
-        /// The first file.
-        first: (String, String),
-        /// One with other columns.
-        other: (String, String),
-    },
-}
-
 /// Looks at files of one bench.
 ///
 /// # Errors
 /// The files do not have the same columns.
-pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
-    let first = files.first().ok_or(LookError::NoFile)?;
+pub fn look(files: &[RawFile]) -> Result<Looked, String> {
+    let first = files.first().ok_or("no file")?;
     let layout = &first.sheet.layout;
     if let Some(other) = files.iter().find(|other| other.sheet.layout.names != layout.names) {
-        let of = |file: &RawFile| (file.file.clone(), file.sheet.layout.names.join(", "));
-        return Err(LookError::OtherColumns { first: of(first), other: of(other) });
+        let [first, other] = [first, other].map(|file| (&file.file, file.sheet.layout.names.join(", ")));
+        return Err(format!(
+            "{} has the columns {}, but {} has {}; allowed: logs of one form together",
+            other.0, other.1, first.0, first.1
+        ));
     }
     let of_file = |file: &RawFile, note: String| if files.len() > 1 { format!("{}: {note}", file.file) } else { note };
     let mut notes: Vec<String> = Vec::new();
@@ -563,7 +544,7 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
 fn ask_for_units(guesses: &mut [Guess], notes: &mut Vec<String>) {
     for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.column.used) {
         let Some((unit, quantity)) = guess.unknown_unit.take().zip(guess.column.role.row()) else { continue };
-        let refusal = quantity.refusal(WrongReading::Unit(unit));
+        let refusal = quantity.family().refusal(&unit);
         (guess.unit, guess.column.counts_per_turn, guess.column.confidence) = (None, None, 0.0);
         notes.push(format!("column {}, {quantity}: {refusal}", place + 1));
     }

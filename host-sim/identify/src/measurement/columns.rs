@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::reader::{Layout, unit_word};
-use super::unit::{Family, WrongReading};
+use super::unit::Family;
 pub use super::unit::{Reading, Unit};
 use flexspline_base::csv_rows::TableProblem;
 use flexspline_base::suggest::{did_you_mean, likeliest, question};
@@ -46,18 +46,6 @@ impl Quantity {
     /// The family of its units.
     pub(crate) fn family(self) -> Family {
         self.row().2.family()
-    }
-
-    /// The refusal of a reading, in words.
-    pub(crate) fn refusal(self, wrong: WrongReading) -> String {
-        match wrong {
-            WrongReading::Text(what) => what,
-            WrongReading::Unit(unit) => {
-                let units: Vec<_> = self.family().units().map(Unit::name).collect();
-                let hint = did_you_mean("; ", &unit, units.iter().copied());
-                format!("found the unit \"{unit}\", allowed: {}{hint}", units.join(", "))
-            }
-        }
     }
 
     /// The largest size a value may have, in the unit used inside (rad, s, N·m, °C): beyond it a double no longer
@@ -222,7 +210,7 @@ impl ColumnMap {
             let said = given.and_then(|given| given.reading);
             let below = || unit_below(quantity, place, layout);
             let reading = said.map_or_else(below, |reading| Ok(Some(reading)));
-            let reading = reading.map_err(|wrong| problem(format!("column {name}: {}", quantity.refusal(wrong))))?;
+            let reading = reading.map_err(|wrong| problem(format!("column {name}: {wrong}")))?;
             let reading = reading.unwrap_or(Reading::of(default.1));
             let (name, said) = (name.to_owned(), said.is_some());
             columns.push(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said });
@@ -287,7 +275,7 @@ fn given(entry: &str, per_ampere: Option<f64>) -> Result<GivenColumn, MappingErr
         }
         Some((column, unit)) => (column, Reading::parse(unit, quantity.family(), per_ampere).map(Some)),
     };
-    let reading = reading.map_err(|wrong| MappingError::of_columns(format!("{name}: {}", quantity.refusal(wrong))))?;
+    let reading = reading.map_err(|wrong| MappingError::of_columns(format!("{name}: {wrong}")))?;
     let column = column.trim().to_owned();
     if column.is_empty() {
         return Err(MappingError::of_columns(format!(
@@ -304,7 +292,7 @@ fn by_number(name: &str, columns: usize) -> Option<usize> {
 }
 
 /// The reading by the line of units below the names; none where it has no word for the column, or a bare number.
-fn unit_below(quantity: Quantity, place: usize, layout: &Layout) -> Result<Option<Reading>, WrongReading> {
+fn unit_below(quantity: Quantity, place: usize, layout: &Layout) -> Result<Option<Reading>, String> {
     let word = layout.units.get(place).map_or("", |unit| unit_word(unit));
     let written = !["", "-", "1"].contains(&word);
     written.then(|| Reading::parse(word, quantity.family(), None)).transpose()

@@ -15,7 +15,6 @@ mod gear;
 mod log;
 mod phd2;
 pub mod reader;
-mod refusal;
 mod rollover;
 mod unit;
 
@@ -27,6 +26,7 @@ pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 use faults::clock::SESSION_GAP_PERIODS;
 pub(crate) use faults::steps::AGREES as STEP_AGREES;
+pub(crate) use faults::units::other_reading;
 pub(crate) use faults::{LineFit, throughout};
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,
@@ -34,9 +34,8 @@ pub use flexspline_base::robust::{
 pub use gear::Gear;
 pub use log::{FEWEST_ROWS, MeasuredError};
 pub use reader::{Layout, Separator, Sheet, raw};
-pub(crate) use refusal::Refusal;
 pub(crate) use rollover::{Anew, begins_anew, continued, registers};
-pub(crate) use unit::{Family, WrongReading};
+pub(crate) use unit::Family;
 
 use faults::Findings;
 use log::Log;
@@ -267,15 +266,16 @@ pub(crate) fn parse_at_least(
     columns: &ColumnMap,
     gear: &Gear,
 ) -> Result<Recording, MeasuredError> {
-    let refuse = |why: Refusal| MeasuredError::of_file(file, &why);
+    let refuse = |why: String| MeasuredError::of_file(file, &why);
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
-        return Err(refuse(Refusal::NoRatio(gear.ratio)));
+        let what = format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio);
+        return Err(refuse(what));
     }
     let mut findings = Findings::default();
     let (mut log, columns) = log::read(file, bytes.into(), columns, gear.ratio, fewest, &mut findings)?;
     let rows = log.len();
     let recorded = in_order(&mut log, &columns, &mut findings).map_err(refuse)?;
-    enough(&log, recorded, fewest).map_err(refuse)?;
+    enough(&log, &recorded, fewest).map_err(refuse)?;
     rollover::unwrap(&mut log, &columns, gear.ratio, &mut findings.notes);
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &columns, gear, &mut findings).map_err(refuse)?;
@@ -293,7 +293,7 @@ pub(crate) fn parse_at_least(
     let mut sessions = log.into_sessions();
     // Each session of a guide log, whose columns nobody maps, has its own zero.
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= columns.is_empty());
-    let Findings { mut faults, tooth_steps, notes } = findings;
+    let Findings { mut faults, tooth_steps, notes, .. } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
 }
@@ -302,7 +302,7 @@ pub(crate) fn parse_at_least(
 ///
 /// # Errors
 /// The time looks as if it were in another unit.
-fn in_order(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings) -> Result<String, Refusal> {
+fn in_order(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings) -> Result<String, String> {
     faults::missing::fill(log, findings);
     faults::clock::check(log, columns, findings)?;
     let recorded = recorded(log);
@@ -338,9 +338,8 @@ impl ReadRows {
         if log.len() > 1 {
             rollover::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings.notes);
         }
-        let Findings { faults, mut notes, .. } = findings;
+        let Findings { faults, mut notes, milliseconds, .. } = findings;
         notes.extend(faults.into_iter().map(|fault| fault.what));
-        let milliseconds = matches!(ordered, Err(Refusal::Milliseconds { .. }));
         let refused = refused.map(|problem| MeasuredError::at(&file.file, problem));
         let refused = refused.or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why)));
         (ReadRows { log, stamps_s, notes, milliseconds }, refused)
@@ -359,14 +358,15 @@ fn recorded(log: &Log) -> String {
 }
 
 /// Whether enough rows are left, and anything moves in them.
-fn enough(log: &Log, recorded: String, fewest: usize) -> Result<(), Refusal> {
+fn enough(log: &Log, recorded: &str, fewest: usize) -> Result<(), String> {
     if log.len() < fewest {
-        return Err(Refusal::TooFew { rows: log.len(), fewest, recorded });
+        let rows = log.len();
+        return Err(format!("{rows} rows have all that is needed; at least {fewest} must ({recorded})"));
     }
     let constant = |channel| log.get(channel).is_some_and(|values| values.iter().all(|value| *value == values[0]));
     let follower = log.output_or_error();
     if constant(Quantity::Generator) && constant(follower) {
-        return Err(Refusal::NothingMoves(follower));
+        return Err(format!("generator and {follower} keep one value throughout; at least one of them must change"));
     }
     Ok(())
 }

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use flexspline_base::suggest::did_you_mean;
+
 table! {
     /// Unit of a column, with its family, how people write it (its name in a mapping first) and its size in the unit
     /// used inside (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its gain: a
@@ -89,6 +91,13 @@ impl Family {
     /// Its units.
     pub(crate) fn units(self) -> impl Iterator<Item = Unit> {
         Unit::ALL.into_iter().filter(move |unit| unit.family() == self)
+    }
+
+    /// The refusal of a unit that is not one of its.
+    pub(crate) fn refusal(self, unit: &str) -> String {
+        let units: Vec<_> = self.units().map(Unit::name).collect();
+        let hint = did_you_mean("; ", unit, units.iter().copied());
+        format!("found the unit \"{unit}\", allowed: {}{hint}", units.join(", "))
     }
 }
 
@@ -206,8 +215,8 @@ impl Reading {
     /// `torque_per_ampere` stands in where a current has no gain.
     ///
     /// # Errors
-    /// The text found and what is allowed; the unit itself if it is not known or not one of `allowed`.
-    pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, WrongReading> {
+    /// The text found and what is allowed.
+    pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, String> {
         let text = text.trim();
         if let Some(unit) = Unit::written(text).filter(|unit| unit.family() == allowed) {
             return Reading::of(unit).complete(false, torque_per_ampere);
@@ -215,17 +224,15 @@ impl Reading {
         let (sign, rest) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest.trim_start()));
         let end = rest.find(['*', '/', '+', '-']).unwrap_or(rest.len());
         let word = rest[..end].trim();
-        let unit = Unit::written(word)
-            .filter(|unit| unit.family() == allowed)
-            .ok_or_else(|| WrongReading::Unit(word.to_owned()))?;
+        let unit = Unit::written(word).filter(|unit| unit.family() == allowed).ok_or_else(|| allowed.refusal(word))?;
         let (mut gain, mut offset, mut scaled) = (sign, 0.0, false);
         let mut rest = rest[end..].trim_start();
         while let Some(operator) = rest.chars().next() {
             let (number, after) = leading_number(rest[1..].trim_start()).ok_or_else(|| {
-                WrongReading::Text(format!(
+                format!(
                     "found \"{rest}\" after the unit, allowed: *, /, + or - and a number, for instance count/16777216 \
                      or V*20-0.4"
-                ))
+                )
             })?;
             match operator {
                 '*' => (gain, offset, scaled) = (gain * number, offset * number, true),
@@ -236,31 +243,22 @@ impl Reading {
             rest = after.trim_start();
         }
         if !(gain.is_finite() && offset.is_finite() && gain != 0.0) {
-            return Err(WrongReading::Text(format!("found \"{text}\", allowed: a gain that is finite and not zero")));
+            return Err(format!("found \"{text}\", allowed: a gain that is finite and not zero"));
         }
         Reading { unit, gain, offset }.complete(scaled, torque_per_ampere)
     }
 
     /// With the gain that a current has by `torque_per_ampere`, or the error that one is missing.
-    fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, WrongReading> {
+    fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, String> {
         let Some(needs) = self.unit.needs_gain().filter(|_| !scaled) else { return Ok(self) };
         let ampere = match self.unit {
             Unit::Ampere => torque_per_ampere,
             Unit::Milliampere => torque_per_ampere.map(|torque| 1e-3 * torque),
             _ => None,
         };
-        self.gain *= ampere.ok_or_else(|| WrongReading::Text(format!("{} needs a number: {needs}", self.unit)))?;
+        self.gain *= ampere.ok_or_else(|| format!("{} needs a number: {needs}", self.unit))?;
         Ok(self)
     }
-}
-
-/// Why a reading is none.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum WrongReading {
-    /// This is no unit, or none of the column's.
-    Unit(String),
-    /// The found value and the allowed ones.
-    Text(String),
 }
 
 /// A number at the beginning of a text, such as `1e-3` or `2^24`, and what follows it.
@@ -332,14 +330,14 @@ mod tests {
             ("deg*0", Family::Angle, "not zero"),
             ("deg/0", Family::Angle, "finite"),
             ("deg*2x", Family::Angle, "after the unit"),
+            ("grad", Family::Angle, "found the unit \"grad\", allowed: rad, deg"),
+            ("deg", Family::Time, "found the unit \"deg\", allowed: s, ms"),
         ] {
             match Reading::parse(text, allowed, None) {
-                Err(WrongReading::Text(what)) => assert!(what.contains(said), "{text}: {what}"),
+                Err(what) => assert!(what.contains(said), "{text}: {what}"),
                 other => panic!("{text}: {other:?}"),
             }
         }
-        assert_eq!(Reading::parse("grad", Family::Angle, None), Err(WrongReading::Unit("grad".to_owned())));
-        assert_eq!(Reading::parse("deg", Family::Time, None), Err(WrongReading::Unit("deg".to_owned())));
     }
 
     #[test]

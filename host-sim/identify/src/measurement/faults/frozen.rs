@@ -9,7 +9,6 @@ use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
-use crate::measurement::refusal::Refusal;
 use flexspline_base::robust::{least_and_most, white_noise};
 
 /// Chance of one false alarm in a file, for a channel with noise. *Guess*: small enough for a lifetime of files.
@@ -47,7 +46,7 @@ fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
 const SUDDEN: f64 = 0.9;
 
 /// Finds frozen stretches and leaves their rows out; a channel that is frozen throughout is an error.
-pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), String> {
     let rows = log.len();
     let (output, generator) = (&log.output_rad(gear.ratio), log.of(Quantity::Generator));
     let outputs_noisy = has_noise(log.pieces(output), NO_NOISE_RAD);
@@ -95,7 +94,10 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     if 2 * left < rows {
         let fault = findings.faults.iter().find(|fault| fault.name == FaultName::FrozenChannel);
         let channel = fault.and_then(|fault| fault.channel).unwrap_or(Quantity::Output);
-        return Err(Refusal::Frozen { channel, frozen: rows - left, rows });
+        return Err(format!(
+            "the {channel} keeps one value over {} of {rows} rows; allowed: at most half of them",
+            rows - left
+        ));
     }
     saturated(log, &mut drop, findings);
     of_channel(log, Quantity::Torque, &mut drop, findings);

@@ -62,6 +62,8 @@ pub(super) struct Findings {
     pub faults: Vec<Fault>,
     pub tooth_steps: Vec<ToothStep>,
     pub notes: Vec<String>,
+    /// Whether the time is refused because it looks like milliseconds.
+    pub milliseconds: bool,
 }
 
 impl Findings {
