@@ -162,7 +162,7 @@ impl Synthesize {
         let made = synthesize(drive, sizes, &chosen, motion, &sensors, &unit, &mut random)
             .map_err(|error| Failure::BadInput(format!("--effect: {error}")))?;
         let csv = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
-        let (data_faults, effects) = made.effects.into_iter().partition(|effect| effect.definition.is_fault());
+        let (data_faults, effects) = made.effects.into_iter().partition(|effect| effect.definition.cause.is_none());
         let truth = Truth {
             schema_version: 1,
             command: context.command.clone(),
@@ -287,7 +287,7 @@ fn text(truth: &Truth, out: &std::path::Path) -> String {
         let _ = writeln!(text, "drive {}, table {id}", truth.nominal.drive);
     }
     for effect in truth.effects.iter().chain(&truth.data_faults) {
-        let _ = writeln!(text, "  {}", effect.definition.name());
+        let _ = writeln!(text, "  {}", effect.definition.name);
         for ParameterSpec { name, .. } in effect.definition.parameters {
             let _ = writeln!(text, "    {name:<32} {:>14.6}", effect.given(*name).unwrap_or(f64::NAN));
         }
@@ -309,7 +309,8 @@ fn listed(effect: &Definition) -> Value {
     };
     let parameters: Vec<Value> = effect.parameters.iter().map(parameter).collect();
     json!({
-        "name": effect.name(), "meaning": effect.meaning, "data_fault": effect.is_fault(), "parameters": parameters,
+        "name": effect.name, "meaning": effect.meaning, "data_fault": effect.cause.is_none(),
+        "parameters": parameters,
     })
 }
 
@@ -332,12 +333,12 @@ fn usual(parameter: &ParameterSpec) -> String {
 fn list() -> String {
     let mut text = String::from("Causes:\n");
     let all = effects();
-    let faults_from = all.iter().position(Definition::is_fault);
+    let faults_from = all.iter().position(|effect| effect.cause.is_none());
     for (k, effect) in all.iter().enumerate() {
         if Some(k) == faults_from {
             text.push_str("\nFaults of the data:\n");
         }
-        let _ = writeln!(text, "  {}: {}", effect.name(), effect.meaning);
+        let _ = writeln!(text, "  {}: {}", effect.name, effect.meaning);
         for parameter in effect.parameters {
             let _ = writeln!(
                 text,

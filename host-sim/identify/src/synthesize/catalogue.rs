@@ -13,37 +13,20 @@ use thiserror::Error;
 
 use super::Sizes;
 use super::data_fault::{DataFault, FAULTS};
+use crate::causes::spec::CauseSpec;
 use crate::causes::{CauseName, Factor, ParameterName, ParameterName as Name, ParameterSpec, Usual};
 use crate::diagnosis::rows::Rows;
-use crate::measurement::FaultName;
 use crate::nominal::Nominal;
 use flexspline_base::suggest::did_you_mean;
 use flexspline_base::units::{ARCSEC_PER_RAD, ARCSEC_PER_TURN};
 
-/// An effect that can be hidden in data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hidden {
-    /// A cause of the library.
-    Cause(CauseName),
-    /// A fault of the data, not of the drive or its sensors.
-    Fault(FaultName),
-}
-
-impl Hidden {
-    /// The cause, if it is one.
-    pub(super) fn cause(self) -> Option<CauseName> {
-        match self {
-            Hidden::Cause(cause) => Some(cause),
-            Hidden::Fault(_) => None,
-        }
-    }
-}
-
 /// An effect that can be asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Definition {
-    /// Its description.
-    pub what: Hidden,
+    /// Its name, snake case.
+    pub name: &'static str,
+    /// The cause of the library that it is; none of a fault of the data.
+    pub cause: Option<CauseName>,
     /// In words.
     pub meaning: &'static str,
     /// Its parameters.
@@ -53,33 +36,14 @@ pub struct Definition {
 }
 
 impl Definition {
-    /// Its name, snake case.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self.what {
-            Hidden::Cause(cause) => cause.as_str(),
-            Hidden::Fault(fault) => fault.as_str(),
-        }
-    }
-
-    /// Whether it is a fault of the data.
-    #[must_use]
-    pub const fn is_fault(&self) -> bool {
-        matches!(self.what, Hidden::Fault(_))
-    }
-
     fn of_cause(cause: CauseName) -> Definition {
-        Definition {
-            what: Hidden::Cause(cause),
-            meaning: cause.does(),
-            parameters: cause.spec().parameters,
-            twins: cause.spec().twins,
-        }
+        let CauseSpec { name, does: meaning, parameters, twins, .. } = *cause.spec();
+        Definition { name, cause: Some(cause), meaning, parameters, twins }
     }
 
     fn of_fault(fault: &DataFault) -> Definition {
         let DataFault { name, meaning, parameters, .. } = *fault;
-        Definition { what: Hidden::Fault(name), meaning, parameters, twins: &[] }
+        Definition { name: name.as_str(), cause: None, meaning, parameters, twins: &[] }
     }
 }
 
@@ -113,7 +77,7 @@ impl Serialize for Effect {
             }
         }
         let mut map = serializer.serialize_map(Some(2))?;
-        map.serialize_entry("name", self.definition.name())?;
+        map.serialize_entry("name", self.definition.name)?;
         map.serialize_entry("parameters", &Values(self))?;
         map.end()
     }
@@ -145,8 +109,8 @@ impl EffectError {
 pub fn parse(text: &str) -> Result<Effect, EffectError> {
     let (name, rest) = text.split_once(':').unwrap_or((text, ""));
     let all = effects();
-    let Some(definition) = all.iter().find(|effect| effect.name() == name) else {
-        return Err(EffectError::unknown("found ", name, &all.iter().map(Definition::name).collect::<Vec<_>>()));
+    let Some(definition) = all.iter().find(|effect| effect.name == name) else {
+        return Err(EffectError::unknown("found ", name, &all.iter().map(|effect| effect.name).collect::<Vec<_>>()));
     };
     let mut effect = Effect::of(*definition);
     for part in rest.split(',').filter(|part| !part.trim().is_empty()) {
@@ -185,7 +149,7 @@ impl Effect {
     }
 
     fn set(&mut self, key: &str, text: &str) -> Result<(), EffectError> {
-        let (effect, parameters) = (self.definition.name(), self.definition.parameters);
+        let (effect, parameters) = (self.definition.name, self.definition.parameters);
         let Some(parameter) = parameters.iter().find(|parameter| parameter.name.as_str() == key) else {
             let allowed: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
             return Err(EffectError::unknown(&format!("{effect}: found parameter "), key, &allowed));
@@ -209,7 +173,7 @@ impl Effect {
 
     /// A value that is out of range, or does not fit the data.
     fn refused(&self, parameter: ParameterName, found: &str, allowed: &str) -> EffectError {
-        EffectError(format!("{}: {parameter}: found {found}, allowed: {allowed}", self.definition.name()))
+        EffectError(format!("{}: {parameter}: found {found}, allowed: {allowed}", self.definition.name))
     }
 
     /// The value of a parameter, if it has one.
@@ -324,7 +288,7 @@ mod tests {
     #[test]
     fn every_cause_and_every_fault_can_be_asked_for_by_its_name() {
         for effect in effects() {
-            assert_eq!(parse(effect.name()).unwrap().definition, effect);
+            assert_eq!(parse(effect.name).unwrap().definition, effect);
         }
     }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use super::catalogue::{Effect, Hidden};
+use super::catalogue::Effect;
 use super::gauss;
 use crate::causes::{ParameterName as Name, ParameterSpec, TIME as INSTANT, Usual::Value, number};
 use crate::measurement::{FaultName, Session};
@@ -201,7 +201,7 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut
         }));
     }
     for effect in effects {
-        let of = |fault: &&DataFault| effect.definition.what == Hidden::Fault(fault.name);
+        let of = |fault: &&DataFault| effect.definition.name == fault.name.as_str();
         if let Some(fault) = FAULTS.iter().find(of) {
             (fault.spoil)(&mut rows, &|name| effect.value(name), random);
         }

@@ -13,7 +13,7 @@ mod catalogue;
 mod data_fault;
 mod excitation;
 
-pub use catalogue::{Definition, Effect, EffectError, Hidden, effects, parse};
+pub use catalogue::{Definition, Effect, EffectError, effects, parse};
 pub use data_fault::to_csv;
 pub use excitation::{MotionPlan, completed, within_temperatures};
 
@@ -154,7 +154,7 @@ pub struct Synthesized {
 fn added_by(effects: &[Effect], rows: &Rows, drive: &Nominal, base: &Base, sizes: Sizes) -> Vec<f64> {
     let scales = LawUnits::new(rows, sizes.pitch_radius_mm, Vec::new());
     let on = Excitation::new(rows, drive, base, &scales);
-    let causes = effects.iter().filter_map(|effect| Some((effect, effect.definition.what.cause()?)));
+    let causes = effects.iter().filter_map(|effect| Some((effect, effect.definition.cause?)));
     let simulated = |(effect, cause): (&Effect, CauseName)| (cause.spec().simulated)(&on, &|name| effect.value(name));
     let causes: Vec<Simulated> = causes.map(simulated).collect();
     let acting: Vec<Acting<'_>> = causes.iter().map(|cause| cause.acting(&on)).collect();
