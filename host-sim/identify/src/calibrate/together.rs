@@ -311,8 +311,8 @@ impl LogPair<'_> {
         let repeats = TAU * if in_a_turn && self.prior.table.is_none() { 1.0 } else { self.prior.nominal.ratio.abs() };
         let step = TAU / STEPS_OF_A_TURN;
         self.search(ROWS_OF_A_SEARCH, |search| {
-            let coarse = search.found(repeats, step, step / FINE_STEPS);
-            let [found, _] = search.close_to(coarse.zero_rad, step / FINE_STEPS);
+            let (coarse, _) = search.found(repeats, step, step / FINE_STEPS);
+            let [found, _] = search.close_to(coarse, step / FINE_STEPS);
             // A curve that hardly goes beyond a turn tells no turns.
             let in_a_turn = within(found, TAU);
             let tells_turns = search.squares(in_a_turn) > OTHER_TURN * search.squares(found);

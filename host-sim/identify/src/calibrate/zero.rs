@@ -109,17 +109,6 @@ pub(super) struct PhaseSearch<'a> {
     basis: FreeSpan,
 }
 
-/// A phase that a search has found.
-#[derive(Clone, Copy)]
-pub(super) struct PhaseFound {
-    /// Generator angle of the rows where that of the curve is zero, rad.
-    pub zero_rad: f64,
-    /// Squares that it leaves, arcsec², the median of those of all places tried, and the least of those elsewhere.
-    least: f64,
-    usual: f64,
-    second: f64,
-}
-
 /// About `most` of the rows.
 pub(super) fn thinned<'r>(rows: impl Iterator<Item = &'r Row> + Clone, most: usize) -> Vec<&'r Row> {
     let every = rows.clone().count().div_ceil(most).max(1);
@@ -156,8 +145,9 @@ impl<'a> PhaseSearch<'a> {
     }
 
     /// The phase that leaves least, of those within the angle after which the curve repeats: in coarse steps, then in
-    /// fine ones about the best places.
-    pub(super) fn found(&self, repeats: f64, coarse_step: f64, fine_step: f64) -> PhaseFound {
+    /// fine ones about the best places. Rad, and the squares that it leaves, arcsec², with the median of those of all
+    /// places tried and the least of those elsewhere.
+    pub(super) fn found(&self, repeats: f64, coarse_step: f64, fine_step: f64) -> (f64, [f64; 3]) {
         let count = (repeats / coarse_step).round() as usize;
         let mut tried: Vec<(f64, f64)> =
             (0..count).map(|k| k as f64 * coarse_step).map(|zero| (self.squares(zero), zero)).collect();
@@ -172,7 +162,7 @@ impl<'a> PhaseSearch<'a> {
         let (least, zero_rad) = close.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0.0));
         let apart = |zero: f64| within(zero - zero_rad, repeats).abs();
         let elsewhere = tried.iter().filter(|(_, zero)| apart(*zero) > 2.0 * coarse_step).map(|(squares, _)| *squares);
-        PhaseFound { zero_rad, least, usual, second: elsewhere.fold(f64::INFINITY, f64::min) }
+        (zero_rad, [least, usual, elsewhere.fold(f64::INFINITY, f64::min)])
     }
 
     /// The least of the parabola through what a phase and its neighbours a `step` away leave, rad, and its standard
@@ -225,7 +215,7 @@ pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignm
     let fine_step = pitch / STEPS_OF_A_PITCH as f64;
     let coarse_step = if repeats <= pitch * 1.001 { fine_step } else { TAU / STEPS_OF_A_TURN as f64 };
     let some = PhaseSearch::new(&of_some, &looked_at, friction_n_m);
-    let PhaseFound { zero_rad: best, least, usual, second } = some.found(repeats, coarse_step, fine_step);
+    let (best, [least, usual, second]) = some.found(repeats, coarse_step, fine_step);
     let all = PhaseSearch::new(&of_all, &found_with, friction_n_m);
     let step = if least < usual * (1.0 - LEAST_GAIN) { fine_step } else { coarse_step };
     let [zero, std] = all.close_to(best, step);

@@ -499,17 +499,15 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
         let is_torque = guess.column.role == Role::Torque;
         let says =
             error.zip(output.as_deref()).and_then(|(error, o)| torque_says(error, o, &guess.values, &guess.of_file));
-        let share = says.map_or(0.0, |says| says.share);
-        match says {
-            Some(says) if says.share > CLEAR => {
-                guess.negative = says.slope < 0.0;
-                let way = if guess.negative { "against" } else { "with" };
-                let share = 100.0 * share;
-                let why =
-                    format!("the error moves {way} it: it explains {share:.0} % in addition to the turn of the output");
-                guess.because(why, if is_torque { 0.8 } else { 0.5 });
-            }
-            _ => guess.because("its sign does not show here", 0.4),
+        let (slope, share) = says.unwrap_or_default();
+        if share > CLEAR {
+            guess.negative = slope < 0.0;
+            let (way, percent) = (if guess.negative { "against" } else { "with" }, 100.0 * share);
+            let why =
+                format!("the error moves {way} it: it explains {percent:.0} % in addition to the turn of the output");
+            guess.because(why, if is_torque { 0.8 } else { 0.5 });
+        } else {
+            guess.because("its sign does not show here", 0.4);
         }
         let rank = (is_torque, !guess.said.commanded, share);
         if best.is_none_or(|(most, _)| rank >= most) {

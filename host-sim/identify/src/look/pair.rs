@@ -129,10 +129,9 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
             if generator == output || against || one_joint == Some(false) && shafts(g) && shafts(o) {
                 continue;
             }
-            let Some(line) = slope(&o.values, &g.values, &g.of_file).filter(|line| line.left < TOGETHER) else {
-                continue;
-            };
-            let Some(units) = units_of_pair(g, o, 1.0 / line.slope) else { continue };
+            let line = slope(&o.values, &g.values, &g.of_file).filter(|(_, left)| *left < TOGETHER);
+            let Some((slope, left)) = line else { continue };
+            let Some(units) = units_of_pair(g, o, 1.0 / slope) else { continue };
             let yes = |is: bool| f64::from(u8::from(is));
             let named = |guess: &Guess| 2.0 * yes(shafts(guess)) + yes(guess.said.angle);
             let reasons = [
@@ -141,7 +140,7 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
                 one_joint.map_or(1.0, |one| 2.0 * yes(one)),
                 yes(turns_on(g)),
                 yes(g.unit == o.unit),
-                -line.left,
+                -left,
             ];
             pairs.push(Pair { generator, output, units, reasons });
         }

@@ -28,18 +28,10 @@ fn rows<const N: usize>(columns: [&[f64]; N]) -> Vec<[f64; N]> {
     all.iter().copied().step_by(all.len().div_ceil(LOOKED_AT).max(1)).collect()
 }
 
-/// A straight line between two columns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Slope {
-    /// Change of the first for one of the second.
-    pub slope: f64,
-    /// Root mean square of the residual of the first, over its range.
-    pub left: f64,
-}
-
 /// How the first column follows the second, if it does; `of_file` says of which file each row is, as each has a zero of
-/// its own.
-pub(super) fn slope(first: &[f64], second: &[f64], of_file: &[f64]) -> Option<Slope> {
+/// its own. The change of the first for one of the second, and the root mean square of the residual of the first, over
+/// its range.
+pub(super) fn slope(first: &[f64], second: &[f64], of_file: &[f64]) -> Option<(f64, f64)> {
     let mut rows = rows([first, second, of_file]);
     if rows.len() < 16 {
         return None;
@@ -53,7 +45,7 @@ pub(super) fn slope(first: &[f64], second: &[f64], of_file: &[f64]) -> Option<Sl
     let range = least_and_most(rows.iter().map(|row| row[0]));
     let LineFit { slope, square, residual } = LineFit::of(&rows.iter().map(|row| (row[1], row[0])).collect::<Vec<_>>());
     let moves = square > 0.0 && range.1 > range.0;
-    moves.then(|| Slope { slope, left: rms(&residual) / (range.1 - range.0) })
+    moves.then(|| (slope, rms(&residual) / (range.1 - range.0)))
 }
 
 /// Counts of a turn, from counts over an angle in rad: the power of two that they nearly are; and how far off, as a
@@ -65,18 +57,11 @@ pub(super) fn counts_of_a_turn(per_rad: f64) -> Option<(f64, f64)> {
     (COUNTS_OF_A_TURN.contains(&near) && off < SAME_COUNT).then_some((near, off))
 }
 
-/// Which way a torque turns the error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TorqueSays {
-    /// Positive where more of it turns the output forward, rad for one of its unit.
-    pub slope: f64,
-    /// Share of what the turns of the output leave of the error that it explains.
-    pub share: f64,
-}
-
 /// How an error (rad) follows a torque in addition to what turns with the output (rad): an eccentric encoder and the
-/// weight of an arm look alike, so both may explain what one of them does.
-pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file: &[f64]) -> Option<TorqueSays> {
+/// weight of an arm look alike, so both may explain what one of them does. The slope, positive where
+/// more of the torque turns the output forward, rad for one of its unit; and the share of what the turns of the output
+/// leave of the error that it explains.
+pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file: &[f64]) -> Option<(f64, f64)> {
     let mut rows = rows([error, output, torque, of_file]);
     // Where it should be: where it is has the error in it, which a load that goes with the angle would then explain.
     rows.iter_mut().for_each(|row| row[1] -= row[0]);
@@ -113,7 +98,7 @@ pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file
     let width = columns[0].len();
     let (_, without) = fitted(width - 1)?;
     let (slope, with) = fitted(width)?;
-    Some(TorqueSays { slope: slope / scale, share: 1.0 - with / without.max(f64::MIN_POSITIVE) })
+    Some((slope / scale, 1.0 - with / without.max(f64::MIN_POSITIVE)))
 }
 
 #[cfg(test)]
@@ -125,20 +110,20 @@ mod tests {
         let motor: Vec<f64> = (0..3000).map(|k| 0.05 * f64::from(k)).collect();
         let out: Vec<f64> = motor.iter().map(|m| 65_536.0 / TAU * (m / 101.0 + 1e-3 * (m / 101.0).sin())).collect();
         let one = vec![0.0; 3000];
-        let found = slope(&out, &motor, &one).unwrap();
-        assert!(found.left < TOGETHER);
+        let (found, left) = slope(&out, &motor, &one).unwrap();
+        assert!(left < TOGETHER);
         // A second file, with zeros of its own.
         let two: Vec<f64> = (0..3000).map(|k| f64::from(u8::from(k >= 1200))).collect();
         let again =
             |values: &[f64], by: f64| values.iter().zip(&two).map(|(v, two)| v + by * two).collect::<Vec<f64>>();
         let (out_again, motor_again) = (again(&out, 90_000.0), again(&motor, -40.0));
-        assert!(slope(&out_again, &motor_again, &one).unwrap().left >= TOGETHER);
-        let found_again = slope(&out_again, &motor_again, &two).unwrap();
-        assert!(found_again.left < TOGETHER && (found_again.slope / found.slope - 1.0).abs() < 1e-3, "{found_again:?}");
+        assert!(slope(&out_again, &motor_again, &one).unwrap().1 >= TOGETHER);
+        let (again, left) = slope(&out_again, &motor_again, &two).unwrap();
+        assert!(left < TOGETHER && (again / found - 1.0).abs() < 1e-3, "{again} {left}");
         let counts = |of: f64| counts_of_a_turn(of / TAU).map(|(counts, _)| counts);
         assert_eq!((counts(-65_536.0), counts(20_000.1), counts(2.7e8)), (Some(65_536.0), None, None));
         let noise: Vec<f64> = (0..3000).map(|k| f64::from((k * 7919) % 3001)).collect();
-        assert!(slope(&noise, &motor, &one).unwrap().left >= TOGETHER);
+        assert!(slope(&noise, &motor, &one).unwrap().1 >= TOGETHER);
     }
 
     #[test]
@@ -151,7 +136,7 @@ mod tests {
         for (error, of_file) in [(&error, &vec![0.0; 2000]), (&other_zero, &two)] {
             let reached: Vec<f64> = out.iter().zip(error).map(|(o, e)| o + e).collect();
             let says = torque_says(error, &reached, &torque, of_file).unwrap();
-            assert!(says.share > CLEAR && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
+            assert!(says.1 > CLEAR && (says.0 * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
         }
         // A ramp of the load goes with the output: what the wheels do on the way is as well the torque's.
         let short: Vec<f64> = out[..300].to_vec();
@@ -159,6 +144,6 @@ mod tests {
         let error: Vec<f64> = short.iter().zip(&ramp).map(|(o, t)| t / 3e4 - 3e-4 * (9.0 * o).sin()).collect();
         let reached: Vec<f64> = short.iter().zip(&error).map(|(o, e)| o + e).collect();
         let says = torque_says(&error, &reached, &ramp, &vec![0.0; 300]).unwrap();
-        assert!(says.share <= CLEAR, "{says:?}");
+        assert!(says.1 <= CLEAR, "{says:?}");
     }
 }

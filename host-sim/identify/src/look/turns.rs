@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::relation::{RATIOS, Slope, counts_of_a_turn, slope};
+use super::relation::{RATIOS, counts_of_a_turn, slope};
 use super::{Guess, Role};
 use crate::measurement::{Unit, registers};
 
@@ -28,10 +28,10 @@ pub(super) fn units_of_counts(guesses: &mut [Guess]) {
             let angle = !matches!(other.column.role, Role::Time | Role::Speed | Role::Torque | Role::Current)
                 && other.unit != Some(Unit::Count)
                 && !other.facts.whole;
-            let line = (j != k && angle && other.moves()).then(|| on_one_shaft(counted, other)).flatten();
+            let slope = (j != k && angle && other.moves()).then(|| on_one_shaft(counted, other)).flatten();
             let units = other.unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
             units.into_iter().filter_map(move |unit| {
-                let (counts, off) = counts_of_a_turn(line?.slope / unit.factor())?;
+                let (counts, off) = counts_of_a_turn(slope? / unit.factor())?;
                 Some((off, j, unit, counts))
             })
         });
@@ -47,13 +47,15 @@ pub(super) fn units_of_counts(guesses: &mut [Guess]) {
     }
 }
 
-/// The line between two columns that show one shaft; names of motor and output, or of two joints, do not.
-pub(super) fn on_one_shaft(a: &Guess, b: &Guess) -> Option<Slope> {
+/// The change of a column for one of another that shows the same shaft; names of motor and output, or of two joints, do
+/// not.
+pub(super) fn on_one_shaft(a: &Guess, b: &Guess) -> Option<f64> {
     let shafts = [a.column.role, b.column.role];
     let two_shafts = shafts.contains(&Role::Generator) && shafts.contains(&Role::Output);
     let two_joints = a.said.joint.zip(b.said.joint).is_some_and(|(a, b)| a != b);
     let line = || slope(&a.values, &b.values, &a.of_file);
-    (!two_shafts && !two_joints).then(line).flatten().filter(|line| line.left < SAME_SHAFT)
+    let (slope, left) = (!two_shafts && !two_joints).then(line).flatten()?;
+    (left < SAME_SHAFT).then_some(slope)
 }
 
 /// Size of one of a unit of angle, rad; nothing for counts of which none knows how many make a turn.
