@@ -494,33 +494,27 @@ fn calibrated<T>(
     let by_a_load_rad = if files.len() > 1 { LEAST_OF_OTHER_RATIO_RAD } else { 0.0 };
     let said = files.iter().map(|file| check_ratio_of(file, prior.nominal.ratio, by_a_load_rad));
     let mut said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-    let parted: Vec<Recording>;
-    let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
-        parted = files.iter().flat_map(|file| by_zeros(file, |session| session.own_zero)).collect();
-        &parted
-    } else {
-        files
-    };
-    let anew = set_anew(files, prior);
-    said.extend(anew.iter().map(|_| SET_ANEW.to_owned()));
-    let files = anew.as_deref().unwrap_or(files);
-    let mut recorded = Recorded::of(files, prior);
-    let mut rows = settled(files, prior, &recorded);
-    let starts = Starts::of(&rows, &recorded, prior, files);
-    let zeros = starts.as_ref().map_or_else(Vec::new, |starts| starts.readings(files));
-    said.extend(starts.iter().flat_map(|starts| starts.notes(files)));
-    let on_one_zero = starts.map(|starts| starts.on_one(files, prior.nominal.ratio));
-    if let Some(files) = &on_one_zero {
-        recorded = Recorded::of(files, prior);
-        rows = settled(files, prior, &recorded);
+    let parted = files.iter().flat_map(|file| by_zeros(file, |session| session.own_zero));
+    let mut files: Vec<Recording> = parted.collect();
+    if let Some(anew) = set_anew(&files, prior) {
+        files = anew;
+        said.push(SET_ANEW.to_owned());
     }
-    let files = on_one_zero.as_deref().unwrap_or(files);
+    let mut recorded = Recorded::of(&files, prior);
+    let mut rows = settled(&files, prior, &recorded);
+    let mut zeros = Vec::new();
+    if let Some(starts) = Starts::of(&rows, &recorded, prior, &files) {
+        zeros = starts.readings(&files);
+        said.extend(starts.notes(&files));
+        files = starts.on_one(files, prior.nominal.ratio);
+        recorded = Recorded::of(&files, prior);
+        rows = settled(&files, prior, &recorded);
+    }
     let delays = Delays::of(rows.clone(), prior, &recorded);
-    let at_one_instant = delays.as_ref().map(|delays| delays.taken_out(files, prior.nominal.ratio));
-    if let Some(files) = &at_one_instant {
-        rows = settled(files, prior, &recorded);
+    if let Some(delays) = &delays {
+        delays.take_out(&mut files, prior.nominal.ratio);
+        rows = settled(&files, prior, &recorded);
     }
-    let at_one_instant = at_one_instant.as_deref().unwrap_or(files);
     if let Some(table) = prior.table {
         recorded.scales.friction_n_m = dead_zone(&rows, prior, table, &recorded);
     }
@@ -532,10 +526,10 @@ fn calibrated<T>(
     let told = alignment.as_ref().filter(|found| found.told);
     let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
     let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
-    let (files_read, recorded) = (at_one_instant, &recorded);
-    fit_with_table(files_read, prior, (&rows, recorded))
+    let (files, recorded) = (&files, &recorded);
+    fit_with_table(files, prior, (&rows, recorded))
         .and_then(|(fitted, made)| {
-            say(FitOfLogs { files: files_read, delays, zeros, prior, alignment, recorded, fitted, made, said })
+            say(FitOfLogs { files, delays, zeros, prior, alignment, recorded, fitted, made, said })
         })
         .map_err(|error| with_faults(error, files, &notes))
 }

@@ -129,9 +129,8 @@ impl Delays {
         Some(Delays(found.collect()))
     }
 
-    /// Logs with both angles as they are at one instant.
-    pub(crate) fn taken_out(&self, files: &[Recording], ratio: f64) -> Vec<Recording> {
-        let mut files = files.to_vec();
+    /// Puts both angles of logs as they are at one instant.
+    pub(crate) fn take_out(&self, files: &mut [Recording], ratio: f64) {
         for (file, delay) in files.iter_mut().zip(&self.0) {
             let by_s = delay.map_or(0.0, |[by_s, _]| by_s);
             for session in &mut file.sessions {
@@ -139,7 +138,6 @@ impl Delays {
                 session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += by_s * speed);
             }
         }
-        files
     }
 
     /// As numbers of their columns; 0 of a log that shows none.

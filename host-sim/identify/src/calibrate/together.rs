@@ -166,14 +166,13 @@ impl Starts {
     }
 
     /// The logs on the zero of the first, without those that do not tell theirs.
-    pub(super) fn on_one(&self, files: &[Recording], ratio: f64) -> Vec<Recording> {
-        let turned = |(file, start): (&Recording, &Start)| {
+    pub(super) fn on_one(&self, files: Vec<Recording>, ratio: f64) -> Vec<Recording> {
+        let turned = |(mut file, start): (Recording, &Start)| {
             let [zero, _] = start.zero_rad?;
-            let mut file = file.clone();
             file.sessions.iter_mut().for_each(|session| session.turn_generator(zero, ratio));
             Some(file)
         };
-        files.iter().zip(&self.0).filter_map(turned).collect()
+        files.into_iter().zip(&self.0).filter_map(turned).collect()
     }
 
     /// The zeros, deg of the generator.
