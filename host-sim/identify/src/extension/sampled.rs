@@ -189,19 +189,11 @@ impl ExtendedTables<'_> {
         let ratio = self.nominal.ratio;
         // Without teeth there is no mesh.
         let positions = positions(ratio, self.nominal.teeth.map_or(0.5, |teeth| f64::from(teeth.flexspline)));
-        let mut nodes = Vec::new();
         let mut sessions = Vec::new();
         for &temperature in temperatures {
             for &torque in torques {
                 for turn in [1.0, -1.0] {
-                    nodes.push((torque, temperature, turn * ratio.signum()));
-                    sessions.push(self.steady(
-                        turn,
-                        positions,
-                        f64::from(torque),
-                        f64::from(temperature),
-                        sessions.len(),
-                    ));
+                    sessions.push(self.steady(turn, positions, [torque, temperature], sessions.len()));
                 }
             }
         }
@@ -211,19 +203,14 @@ impl ExtendedTables<'_> {
         }
         let mut samples = Vec::new();
         let mut beyond = 0.0;
-        for (((torque, temperature, forward), session), [nominal, error]) in nodes.iter().zip(&sessions).zip(&predicted)
-        {
-            for k in BEFORE..session.len() {
-                let error_arcsec = error[k];
-                beyond += error_arcsec - nominal[k];
-                let generator_rad = session.generator_rad[k];
-                samples.push(Sample {
-                    generator_rad,
-                    torque_n_m: f64::from(*torque),
-                    temperature_c: f64::from(*temperature),
-                    direction: if *forward > 0.0 { Direction::Forward } else { Direction::Backward },
-                    output_rad: generator_rad / ratio + error_arcsec / ARCSEC_PER_RAD,
-                });
+        for (session, [nominal, error]) in sessions.iter().zip(&predicted) {
+            let rises = session.generator_rad[1] > session.generator_rad[0];
+            let direction = if rises == (ratio > 0.0) { Direction::Forward } else { Direction::Backward };
+            let rows = session.states(0.0).zip(nominal.iter().zip(error)).skip(BEFORE);
+            for ([generator_rad, torque_n_m, temperature_c], (nominal, error)) in rows {
+                beyond += error - nominal;
+                let output_rad = generator_rad / ratio + error / ARCSEC_PER_RAD;
+                samples.push(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad });
             }
         }
         // The zero of the encoder: what is left when both signs of load, both directions and all angles have their
@@ -233,12 +220,13 @@ impl ExtendedTables<'_> {
         Ok(samples)
     }
 
-    fn steady(&self, turn: f64, positions: usize, torque: f64, temperature: f64, number: usize) -> Session {
+    fn steady(&self, turn: f64, positions: usize, at: [f32; 2], number: usize) -> Session {
         let step = turn * TAU * self.nominal.ratio.abs() / positions as f64;
         let rows = BEFORE + positions;
         // So slow that nothing of it depends on speed.
         let time_s = (0..rows).map(|k| 1e4 * (k + 2 * rows * number) as f64).collect();
         let generator_rad = (0..rows).map(|k| (k as f64 - BEFORE as f64) * step).collect();
+        let [torque, temperature] = at.map(f64::from);
         let others = [torque, temperature, self.orientation_rad.unwrap_or(0.0)].map(|value| vec![value; rows]);
         Session::imagined(time_s, generator_rad, others)
     }
