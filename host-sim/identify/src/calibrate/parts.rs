@@ -208,7 +208,6 @@ pub(super) fn flank(at: &State, friction_n_m: f64) -> f64 {
 
 /// The weights of a part's columns in its penalty.
 pub(super) fn weights(part: PartName) -> Vec<f64> {
-    let of_waves = |orders: u16| (1..=orders).flat_map(|k| [f64::from(k).powi(WAVE_POWER); 2]).collect();
     match part {
         PartName::WindUp => {
             // A straight line is no wrinkle: where loads are few, what they leave open is straight.
@@ -218,12 +217,13 @@ pub(super) fn weights(part: PartName) -> Vec<f64> {
         PartName::Play => vec![LAG_WEIGHT, LAG_WEIGHT, 1.0],
         PartName::Temperature => vec![1.0; 3],
         PartName::ReadingDelay(_) => vec![1.0],
-        PartName::GeneratorAngle | PartName::MaterialAngle => of_waves(GENERATOR_ORDERS),
-        PartName::ToothPitch => of_waves(TOOTH_ORDERS),
-        PartName::OutputAngle => of_waves(OUTPUT_ORDERS),
         PartName::WavesByLoad | PartName::WavesByFlank => {
             vec![1.0; 2 * usize::from(GENERATOR_ORDERS + OUTPUT_ORDERS)]
         }
+        of_one_angle => wave_angles(of_one_angle, 0.0, 0.0, &Scales::default())
+            .flat_map(|(_, orders)| 1..=orders)
+            .flat_map(|k| [f64::from(k).powi(WAVE_POWER); 2])
+            .collect(),
     }
 }
 

@@ -9,25 +9,26 @@ use flexspline_base::csv_rows::TableProblem;
 use flexspline_base::suggest::{did_you_mean, likeliest, question};
 
 table! {
-    /// The quantities of a column, each with its name in a mapping, the column it has in a file without a mapping, and
-    /// the unit of that column.
+    /// The quantities of a column, each with its name in a mapping, the column it has in a file without a mapping, the
+    /// unit of that column, and the largest size that a value may have, in the unit used inside (rad, s, N·m, °C):
+    /// beyond it a double no longer resolves an arc-second, or nothing of the kind exists. *Guesses*.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
     #[serde(rename_all = "snake_case")]
-    pub enum Quantity: (&'static str, &'static str, Unit) {
+    pub enum Quantity: (&'static str, &'static str, Unit, f64) {
         /// Time.
-        Time = ("time", "time_s", Unit::Second),
+        Time = ("time", "time_s", Unit::Second, 1e11),
         /// Generator angle.
-        Generator = ("generator", "generator_rad", Unit::Radian),
+        Generator = ("generator", "generator_rad", Unit::Radian, 1e9),
         /// Output angle.
-        Output = ("output", "output_rad", Unit::Radian),
+        Output = ("output", "output_rad", Unit::Radian, 1e9),
         /// Output angle less generator over ratio.
-        Error = ("error", "error_arcsec", Unit::Arcsecond),
+        Error = ("error", "error_arcsec", Unit::Arcsecond, 1e9),
         /// Load torque at the output.
-        Torque = ("torque", "torque_n_m", Unit::NewtonMetre),
+        Torque = ("torque", "torque_n_m", Unit::NewtonMetre, 1e9),
         /// Temperature.
-        Temperature = ("temperature", "temperature_c", Unit::Celsius),
+        Temperature = ("temperature", "temperature_c", Unit::Celsius, 1e6),
         /// Angle of the drive against gravity.
-        Orientation = ("orientation", "orientation_rad", Unit::Radian),
+        Orientation = ("orientation", "orientation_rad", Unit::Radian, 1e9),
     }
 }
 
@@ -39,7 +40,7 @@ impl Quantity {
 
     /// The column it has in a file without a mapping, and the unit there.
     pub(crate) fn default_column(self) -> (&'static str, Unit) {
-        let (_, column, unit) = self.row();
+        let (_, column, unit, _) = self.row();
         (column, unit)
     }
 
@@ -48,14 +49,9 @@ impl Quantity {
         self.row().2.family()
     }
 
-    /// The largest size a value may have, in the unit used inside (rad, s, N·m, °C): beyond it a double no longer
-    /// resolves an arc-second, or nothing of the kind exists.
+    /// The largest size a value may have.
     pub(super) fn limit(self) -> f64 {
-        match self {
-            Quantity::Time => 1e11,
-            Quantity::Temperature => 1e6,
-            _ => 1e9,
-        }
+        self.row().3
     }
 }
 

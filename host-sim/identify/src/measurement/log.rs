@@ -263,7 +263,7 @@ pub(crate) fn of_columns(
         "the last line breaks off: it is left out".to_owned()
     });
     let notes = &mut findings.notes;
-    let mut refused = check_rows(layout, &read, columns).err();
+    let mut refused = check_rows(layout, &read, columns);
     let mut refuse = |why: Option<TableProblem>| refused = refused.take().or(why);
     let of_header = |what: String| Some(TableProblem { line: layout.header_line, what });
     if let Some((place, what)) = &layout.whole_seconds
@@ -273,11 +273,11 @@ pub(crate) fn of_columns(
     }
     let mut log = Log::default();
     for (column, cells) in columns.iter().zip(std::mem::take(&mut read.cells)) {
-        refuse(check_cells(column, &cells).err());
+        refuse(check_cells(column, &cells));
         notes.extend(cells.over_note(&column.name));
         let times = cells.times.count > 0;
         let mut values = cells.values;
-        let beyond = if times { None } else { within_limits(column, &values, &read.lines).err() };
+        let beyond = if times { None } else { within_limits(column, &values, &read.lines) };
         if beyond.is_some() || times && column.quantity != Quantity::Time {
             values.fill(f64::NAN);
         } else if !times {
@@ -334,46 +334,44 @@ fn guide_log(bytes: &[u8], map: &ColumnMap, ratio: f64, findings: &mut Findings)
 }
 
 /// Refuses rows that end before a column in use, or have more fields than names.
-fn check_rows(layout: &Layout, read: &Columns, columns: &[MappedColumn]) -> Result<(), TableProblem> {
+fn check_rows(layout: &Layout, read: &Columns, columns: &[MappedColumn]) -> Option<TableProblem> {
     let beyond = |fields: usize| columns.iter().find(|column| column.place >= fields);
     let is_odd = |(_, fields): &&(u64, usize)| *fields > layout.names.len() || beyond(*fields).is_some();
-    let Some((line, fields)) = read.odd.iter().filter(is_odd).min().copied() else { return Ok(()) };
+    let (line, fields) = read.odd.iter().filter(is_odd).min().copied()?;
     // A cell above it that is no number comes first.
     if read.cells.iter().filter_map(|cells| cells.words.first.as_ref()).any(|word| word.line <= line) {
-        return Ok(());
+        return None;
     }
     let what = match beyond(fields) {
         Some(column) => format!("{fields} fields, but {} is field {}", column.name, column.place + 1),
         None => format!("{fields} fields, but the header has {}", layout.names.len()),
     };
-    Err(TableProblem { line, what })
+    Some(TableProblem { line, what })
 }
 
 /// Refuses what is neither a number nor nothing, and times elsewhere than in the column of time.
-fn check_cells(column: &MappedColumn, cells: &Cells) -> Result<(), TableProblem> {
+fn check_cells(column: &MappedColumn, cells: &Cells) -> Option<TableProblem> {
     let times = cells.times.first.as_ref().filter(|_| column.quantity != Quantity::Time);
-    let Some(cell) = cells.words.first.iter().chain(times).min_by_key(|cell| cell.line) else { return Ok(()) };
+    let cell = cells.words.first.iter().chain(times).min_by_key(|cell| cell.line)?;
     let more = cells.words.count.saturating_sub(1);
     let others = if more == 0 { String::new() } else { format!(" ({more} more in this column)") };
     let what = format!(
         "{}: found \"{}\"{others}, allowed: a number, or nothing where none was recorded",
         column.name, cell.text
     );
-    Err(TableProblem { line: cell.line, what })
+    Some(TableProblem { line: cell.line, what })
 }
 
 /// Refuses numbers that nothing of the kind has.
-fn within_limits(column: &MappedColumn, numbers: &[f64], lines: &[u64]) -> Result<(), TableProblem> {
+fn within_limits(column: &MappedColumn, numbers: &[f64], lines: &[u64]) -> Option<TableProblem> {
     let limit = column.quantity.limit();
-    let Some(row) = numbers.iter().position(|number| column.reading.value(*number).abs() > limit) else {
-        return Ok(());
-    };
+    let row = numbers.iter().position(|number| column.reading.value(*number).abs() > limit)?;
     let unit = match column.quantity {
         Quantity::Error => super::columns::Unit::Radian,
         quantity => quantity.default_column().1,
     };
     let what = format!("{}: found \"{:e}\", allowed: at most {limit:e} {unit}", column.name, numbers[row]);
-    Err(TableProblem { line: lines[row], what })
+    Some(TableProblem { line: lines[row], what })
 }
 
 /// Rows in the order of their time.

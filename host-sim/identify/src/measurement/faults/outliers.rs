@@ -58,12 +58,8 @@ const REPEATS_MANY: f64 = 12.0;
 
 /// How far row `row` is from the rows before and after, and from where they go on to, if all say so; 0 if one of them
 /// bears it out. A load turns sharply within a row and means it, and the wind-up with it: such a tip goes on as one of
-/// its sides does.
-fn off_course(values: &[f64], row: usize) -> f64 {
-    let by = out_by(values, row);
-    if by == 0.0 {
-        return 0.0;
-    }
+/// its sides does. It is out `by` this at most.
+fn off_course(values: &[f64], row: usize, by: f64) -> f64 {
     let (before, after) = ([3, 2, 1].map(|k| values[row - k]), [3, 2, 1].map(|k| values[row + k]));
     let borne_out = [before[2], after[2], carried_on(before), carried_on(after)];
     let (low, high) = least_and_most(borne_out);
@@ -123,10 +119,8 @@ fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
     let mut found = Vec::new();
     for row in AROUND_ONE..values.len().saturating_sub(AROUND_ONE) {
         // The cheaper bound first: it is the larger one.
-        if out_by(values, row).abs() <= least {
-            continue;
-        }
-        let by = off_course(values, row);
+        let most = out_by(values, row);
+        let by = if most.abs() > least { off_course(values, row, most) } else { 0.0 };
         if by.abs() <= least {
             continue;
         }
