@@ -121,16 +121,10 @@ pub struct WindUpCurve<'t> {
 }
 
 impl<'t> WindUpCurve<'t> {
-    /// By a table, from where a drive rests in its play.
+    /// By a table, from where a drive rests in its play, with springs that hold nothing yet.
     #[must_use]
-    pub fn new(table: &'t Table<'t>, play: PlayState) -> Self {
-        Self { table, play, hysteresis: Hysteresis::default(), held: HeldTorques::default() }
-    }
-
-    /// With springs that hold nothing yet.
-    #[must_use]
-    pub fn with(self, hysteresis: Hysteresis) -> Self {
-        Self { hysteresis, ..self }
+    pub fn new(table: &'t Table<'t>, play: PlayState, hysteresis: Hysteresis) -> Self {
+        Self { table, play, hysteresis, held: HeldTorques::default() }
     }
 
     /// Torque of the next reading with its least and its most, N·m, where the error (output less generator over ratio,
@@ -200,7 +194,7 @@ pub(crate) fn along<R>(
             row.error_arcsec / ARCSEC_PER_RAD - f64::from(said.transmission_error_rad) - lags
         });
         let zero = mean(&left.collect::<Vec<f64>>());
-        let mut curve = WindUpCurve::new(table, PlayState::unknown()).with(hysteresis.clone());
+        let mut curve = WindUpCurve::new(table, PlayState::unknown(), hysteresis.clone());
         all.extend(rows.iter().map(|row| read(&mut curve, row, row.error_arcsec / ARCSEC_PER_RAD - zero)));
     }
     all

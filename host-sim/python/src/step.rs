@@ -333,10 +333,10 @@ impl Table {
         let ratio = table.drive().exact_ratio();
         let sides = directions(direction.as_ref(), rows)?;
         let hysteresis = hysteresis.map_or(Ok(Hysteresis::default()), serde_json::from_str).map_err(bad)?;
-        let mut wind_up = WindUpCurve::new(table, state.map_or(CoreState::unknown(), PlayState::get)).with(hysteresis);
+        let mut wind_up = WindUpCurve::new(table, state.map_or(CoreState::unknown(), PlayState::get), hysteresis);
         for_rows(py, rows, |row| {
             if let Some(sides) = &sides {
-                wind_up = WindUpCurve::new(table, CoreState::after_motion(sides.at(row)));
+                wind_up = WindUpCurve::new(table, CoreState::after_motion(sides.at(row)), Hysteresis::default());
             }
             let error = reading.at(row) - generator[row] / ratio;
             [torque[row], low[row], high[row]] =

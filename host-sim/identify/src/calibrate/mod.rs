@@ -13,7 +13,6 @@
 //! recorded that could show it, and no table is made that leaves more than a simpler one.
 
 mod at_rest;
-mod choose;
 mod folds;
 mod interval;
 mod parts;
@@ -35,13 +34,12 @@ use crate::measurement::{Fault, FaultName, MeasuredError, Recording, Session, le
 use crate::misfit::LEAVES;
 use crate::residual::{is_no_noise, strongest};
 pub use at_rest::{LoopFigure, TorqueLoop};
-pub(crate) use choose::LEAST_GAIN;
-use choose::{best_penalty, nested, path};
 use flexspline_base::robust::{dot, rms};
 use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use flexspline_mechanics::drive::GeneratorKind;
+pub(crate) use folds::LEAST_GAIN;
 use folds::{Chosen, Folds};
 pub(crate) use interval::OF_95;
 pub use interval::{ModelUncertainty, Node, RowNoise};
@@ -859,7 +857,7 @@ impl Fitted {
             let explained = || {
                 let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
                 let without = folds.left_out(&all, &others);
-                let with = chosen.map_or_else(|| best_penalty(folds, &all, &others, part).1, |_| with);
+                let with = chosen.map_or_else(|| folds.best_penalty(&all, &others, part).1, |_| with);
                 let share = (without - with) / without;
                 let explain =
                     format!("{:.1} % of the remaining variance (threshold {:.0} %)", 100.0 * share, 100.0 * LEAST_GAIN);
@@ -899,8 +897,8 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
         open.retain(|part| without.iter().all(|(other, _)| other != part));
         let folds = rows.folds_of(&open, &recorded.scales);
         let all = folds.all();
-        let left = nested(&folds);
-        let path = path(&folds, &all);
+        let left = folds.nested();
+        let path = folds.path(&all);
         // The fewest parts that leave least where neither choice nor fit was made.
         let most = (0..path.len()).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
         let chosen = path[most].clone();

@@ -214,7 +214,12 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationErro
 
     let mut known = vec![Gram::none(width_of(&chosen) + 2); logs];
     let travel = bench.output_deg.map(f64::to_radians);
-    let asked = Asked::of(&scales, ratio, travel, &chosen);
+    let moment = asked(&scales, ratio, travel, &chosen);
+    let mean_variance = |covariance: &[f64]| {
+        let width = moment.size - 1;
+        let pairs = (0..width).flat_map(|i| (0..width).map(move |j| (i, j)));
+        pairs.map(|(i, j)| moment.at(i, j) * covariance[i * width + j]).sum::<f64>().max(0.0)
+    };
     let of = |known: &[Gram]| {
         let covariance = planned_covariance(known, &chosen, &scales, noise.of_a_row());
         covariance.ok_or(CalibrationError::Known("the information matrix is singular".to_owned()))
@@ -223,7 +228,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationErro
     let mut now = of(&known)?;
     let (mut left_s, mut taken) = (60.0 * bench.minutes, Vec::new());
     while taken.len() < MOST_PASSES {
-        let uncertain = asked.mean_variance(&now);
+        let uncertain = mean_variance(&now);
         let mut best: Option<(f64, usize, Vec<f64>)> = None;
         // The ends of the loads first, as a table ends where they do; then each load and temperature once before one is
         // repeated: the parts do not know all that they do.
@@ -239,7 +244,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationErro
             let mut with = known.clone();
             with[pass.log - 1].add(information, 1.0);
             let then = of(&with)?;
-            let gain = (uncertain - asked.mean_variance(&then)) / pass.duration_s;
+            let gain = (uncertain - mean_variance(&then)) / pass.duration_s;
             if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
                 best = Some((gain, k, then));
             }
@@ -267,7 +272,14 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationErro
         )));
     }
     let nodes = widths(&chosen, &scales, &now, None);
-    let passes = in_order(taken);
+    // Cold first; at each temperature in the order in which they tell most, so that a log that is broken off is worth
+    // most.
+    let (mut passes, mut ends_s) = (taken, vec![0.0; logs]);
+    passes.sort_by_key(|pass| pass.log);
+    for pass in &mut passes {
+        pass.begin_s = ends_s[pass.log - 1];
+        ends_s[pass.log - 1] += pass.duration_s;
+    }
     if chosen.contains(&PartName::WindUp) {
         let mut loads: Vec<f64> = passes.iter().map(|pass| pass.torque_n_m).collect();
         loads.sort_by(f64::total_cmp);
@@ -295,49 +307,26 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationErro
         noise,
         minutes: passes.iter().map(|pass| pass.duration_s).sum::<f64>() / 60.0,
         passes,
-        expected_rms_arcsec: asked.mean_variance(&now).sqrt(),
+        expected_rms_arcsec: mean_variance(&now).sqrt(),
         nodes,
         cannot,
         command: String::new(),
     })
 }
 
-/// Cold first; at each temperature in the order in which they tell most, so that a log that is broken off is worth
-/// most.
-fn in_order(mut passes: Vec<Pass>) -> Vec<Pass> {
-    passes.sort_by_key(|pass| pass.log);
-    let (mut log, mut begin_s) = (0, 0.0);
-    for pass in &mut passes {
-        begin_s = if pass.log == log { begin_s } else { 0.0 };
-        (log, pass.begin_s) = (pass.log, begin_s);
-        begin_s += pass.duration_s;
-    }
-    passes
-}
-
 /// Target of the plan: the mean of `x xᵀ` over all that it is to hold, about the mean of `x`, as what is the same
 /// everywhere is the zero of the encoder.
-struct Asked(Gram);
-
-impl Asked {
-    fn of(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[PartName]) -> Asked {
-        let mut moment = Gram::none(width_of(chosen) + 2);
-        // The zero by temperature: logs of one temperature each cannot tell it from the encoder's.
-        let warmth = chosen.iter().position(|part| *part == PartName::Temperature);
-        let zero = warmth.map(|at| 1 + width_of(&chosen[..at]));
-        for at in spread(scales, ratio, travel, ASKED) {
-            let mut row = row_of_group(chosen, &at, scales, 0.0);
-            zero.into_iter().for_each(|zero| row[zero] = 0.0);
-            moment.add_row(&row, 1.0 / ASKED as f64);
-        }
-        Asked(moment.first_free())
+fn asked(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[PartName]) -> Gram {
+    let mut moment = Gram::none(width_of(chosen) + 2);
+    // The zero by temperature: logs of one temperature each cannot tell it from the encoder's.
+    let warmth = chosen.iter().position(|part| *part == PartName::Temperature);
+    let zero = warmth.map(|at| 1 + width_of(&chosen[..at]));
+    for at in spread(scales, ratio, travel, ASKED) {
+        let mut row = row_of_group(chosen, &at, scales, 0.0);
+        zero.into_iter().for_each(|zero| row[zero] = 0.0);
+        moment.add_row(&row, 1.0 / ASKED as f64);
     }
-
-    fn mean_variance(&self, covariance: &[f64]) -> f64 {
-        let width = self.0.size - 1;
-        let pairs = (0..width).flat_map(|i| (0..width).map(move |j| (i, j)));
-        pairs.map(|(i, j)| self.0.at(i, j) * covariance[i * width + j]).sum::<f64>().max(0.0)
-    }
+    moment.first_free()
 }
 
 /// What a bench can record in all the time there is.

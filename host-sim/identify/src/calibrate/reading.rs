@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-use super::choose::{LEAST_GAIN, PENALTIES, path};
-use super::folds::{Chosen, Row};
+use super::folds::{Chosen, LEAST_GAIN, PENALTIES, Row};
 use super::interval::{ModelUncertainty, OF_95, left_by};
 use super::parts::{PartName, Scales, expected_arcsec};
 use super::rows::{Recorded, Rows, speeds_rad_s};
@@ -68,7 +67,7 @@ impl Delays {
         let parts = recorded.shown(PartName::ALL.into_iter().chain(delays.iter().copied()), prior);
         let folds = rows.folds_of(&parts, &scales);
         let all = folds.all();
-        let gainful = path(&folds, &all).pop()?;
+        let gainful = folds.path(&all).pop()?;
         // Play goes nearly as a delay does: it is there, or the delay would take it up, and where the two oppose each
         // other neither gains alone. What rows do not tell apart is shared as either is to be expected. At one pace all
         // is play, but an output that leads: no play does that.

@@ -40,18 +40,11 @@ struct EncoderTurn {
     of: &'static str,
     turn: &'static str,
     part: PartName,
-    /// Its first column among all waves.
-    first: usize,
 }
 
 const ENCODERS: [EncoderTurn; 2] = [
-    EncoderTurn {
-        of: "encoder_output",
-        turn: "output",
-        part: PartName::OutputAngle,
-        first: 2 * GENERATOR_ORDERS as usize,
-    },
-    EncoderTurn { of: "encoder_generator", turn: "generator", part: PartName::GeneratorAngle, first: 0 },
+    EncoderTurn { of: "encoder_output", turn: "output", part: PartName::OutputAngle },
+    EncoderTurn { of: "encoder_generator", turn: "generator", part: PartName::GeneratorAngle },
 ];
 const GEAR: &str = "gear";
 
@@ -158,7 +151,8 @@ impl SplitWaves<'_> {
             let why = format!("the weight of an arm does the same by the wind-up: record the torque{turned}");
             return (f64::INFINITY, Some(why));
         }
-        let first = encoder.first + 2 * (order as usize - 1);
+        // Waves of the output stand behind those of the generator.
+        let first = 2 * (order - 1 + u32::from(of_output) * u32::from(GENERATOR_ORDERS)) as usize;
         let change = |(part, _): &(PartName, f64)| {
             let [sine, cosine] = [0, 1].map(|k| self.changing.std_of(*part, first + k).unwrap_or(f64::INFINITY));
             OF_95 * sine.hypot(cosine)

@@ -460,7 +460,7 @@ fn a_sum_over_folds_is_the_fit_to_the_rows() {
         })
         .collect();
     let folds = Folds::new(&rows, &[PartName::GeneratorAngle], &scales, 1, false);
-    assert_eq!(path(&folds, &folds.all())[1][0].part, PartName::GeneratorAngle);
+    assert_eq!(folds.path(&folds.all())[1][0].part, PartName::GeneratorAngle);
     let chosen = [Chosen { part: PartName::GeneratorAngle, penalty: 1e-9 }];
     let fitted = folds.fit(&folds.all(), &chosen, &[]).unwrap();
     assert!((fitted[0] - 3.0).abs() < 1e-4 && (fitted[1] - 7.0).abs() < 1e-4, "{fitted:?}");

@@ -4,8 +4,7 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-use super::choose::{LEAST_GAIN, PENALTIES};
-use super::folds::{Chosen, Folds, Row};
+use super::folds::{Chosen, Folds, LEAST_GAIN, PENALTIES, Row};
 use super::interval::OF_95;
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;

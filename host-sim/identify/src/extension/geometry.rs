@@ -115,19 +115,12 @@ impl Placing<'_> {
         self.cause.parameters.get(name.as_str()).copied()
     }
 
-    /// Changes a number of the file, and says what it is then.
+    /// Changes a number of the file, and says what it is then: a coefficient per kelvin as a power of ten.
     fn set(&mut self, path: &str, change: impl FnOnce(f64) -> f64) {
         if let Some(number) = self.found.number_mut(path) {
             *number = change(*number);
+            let number = if path.ends_with("_per_k") { format!("{number:e}") } else { number.to_string() };
             self.fields.push(format!("{path} = {number}"));
-        }
-    }
-
-    /// Adds to a coefficient, which is written as a power of ten.
-    fn add(&mut self, path: &str, more: f64) {
-        if let Some(number) = self.found.number_mut(path) {
-            *number += more;
-            self.fields.push(format!("{path} = {number:e}"));
         }
     }
 
@@ -242,7 +235,7 @@ impl Placing<'_> {
         // A ring that grows by dr opens its spaces by 2 dr tan a / r.
         let more = per_k / ARCSEC_PER_RAD / (2.0 * self.drive.circular_spline.bearing_flank_angle_rad().tan());
         for path in ["temperature.circular_spline_expansion_per_k", "temperature.housing_expansion_per_k"] {
-            self.add(path, more);
+            self.set(path, |before| before + more);
         }
     }
 
@@ -268,7 +261,7 @@ impl Placing<'_> {
     pub(crate) fn set_stiffness_per_k(&mut self) {
         let Some(per_k) = self.value(Name::StiffnessRelativePerK) else { return };
         if (self.found.temperature.youngs_modulus_per_k + per_k).abs() <= 1e-3 {
-            self.add("temperature.youngs_modulus_per_k", per_k);
+            self.set("temperature.youngs_modulus_per_k", |before| before + per_k);
         }
     }
 }

@@ -102,7 +102,10 @@ impl Model {
     /// The nominal model recalibrated, with the causes of a diagnosis as they were fitted.
     #[must_use]
     pub(crate) fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis, fitted: &Extended) -> Model {
-        let of = |cause: &Cause| CauseEntry::of(cause.name, &cause.parameters).fitted_by(fitted, nominal);
+        let of = |cause: &Cause| {
+            let entry = CauseEntry::of(cause.name, &cause.parameters);
+            CauseEntry { fit: fitted.fitted_law(cause.name, nominal, fingerprint(&entry.parameters)), ..entry }
+        };
         let causes = diagnosis.causes.iter().map(of).collect();
         let change = |name: &str| diagnosis.recalibrated.get(name).map_or(0.0, |p| p.value);
         let mut nominal = nominal.clone();
@@ -265,12 +268,6 @@ impl CauseEntry {
     pub(crate) fn of(name: CauseName, parameters: &BTreeMap<&'static str, Parameter>) -> CauseEntry {
         let parameters = parameters.iter().map(|(name, found)| ((*name).to_owned(), found.value)).collect();
         CauseEntry { name, parameters, fit: None }
-    }
-
-    /// The cause with the model that was fitted, for a nominal model.
-    #[must_use]
-    pub(crate) fn fitted_by(self, extended: &Extended, nominal: &Nominal) -> CauseEntry {
-        CauseEntry { fit: extended.fitted_law(self.name, nominal, fingerprint(&self.parameters)), ..self }
     }
 
     /// The effect that simulates it, if there is one.

@@ -1,7 +1,6 @@
 //! Faults of the data: what goes wrong between the sensors and the file.
 
 use std::f64::consts::TAU;
-use std::fmt::Write as _;
 
 use super::catalogue::Effect;
 use super::gauss;
@@ -206,22 +205,16 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut
             (fault.spoil)(&mut rows, &|name| effect.value(name), random);
         }
     }
-    let mut text = String::with_capacity(80 * rows.len());
-    text.push_str(HEADER);
-    for row in rows {
-        for (k, value) in row.iter().enumerate() {
-            let comma = if k > 0 { "," } else { "" };
-            // Digits that the sensor does not have would only fill the disc: 1e-9 rad is 0.0002".
-            let _ = match k {
-                _ if !value.is_finite() => write!(text, "{comma}"),
-                TIME => write!(text, "{comma}{value:.6}"),
-                GENERATOR | OUTPUT => write!(text, "{comma}{value:.9}"),
-                _ => write!(text, "{comma}{value:.4}"),
-            };
-        }
-        text.push('\n');
-    }
-    text
+    let mut text = csv::Writer::from_writer(Vec::with_capacity(80 * rows.len()));
+    // Digits that the sensor does not have would only fill the disc: 1e-9 rad is 0.0002".
+    let digits = |column: usize| [6, 9, 9, 4, 4, 4][column];
+    let written = |(column, value): (usize, &f64)| {
+        if value.is_finite() { format!("{value:.*}", digits(column)) } else { String::new() }
+    };
+    let records = rows.iter().map(|row| text.write_record(row.iter().enumerate().map(written)));
+    records.collect::<Result<(), _>>().expect("memory takes what is written");
+    let bytes = text.into_inner().expect("memory takes what is written");
+    HEADER.to_owned() + &String::from_utf8(bytes).expect("numbers are text")
 }
 
 #[cfg(test)]
