@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use flexspline::{GeneratorAngle, PlayState, Prediction, Quality, Table};
+use flexspline::{GeneratorAngle, PlayState, Prediction, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -65,7 +65,7 @@ pub struct ReplayedRow {
 }
 
 /// `summary.json` of a replay.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ReplaySummary {
     /// Version of this object.
     pub schema_version: u32,
@@ -105,6 +105,8 @@ pub struct ReplaySummary {
     pub command: String,
 }
 
+/// Names of the [`flexspline::Quality`] of a prediction, in its order.
+const QUALITIES: [&str; 4] = ["in range", "uncertain", "extrapolated", "disabled"];
 /// File of results as `simulate` names it, and the summary in its folder.
 const RESULTS: [&str; 2] = ["results.csv", "summary.json"];
 
@@ -333,12 +335,7 @@ pub fn replay(
                 predicted_arcsec: f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD,
                 residual_arcsec: *residual,
                 uncertainty_arcsec: f64::from(said.uncertainty_rad) * ARCSEC_PER_RAD,
-                quality: match said.quality {
-                    Quality::InRange => "in range",
-                    Quality::Uncertain => "uncertain",
-                    Quality::Extrapolated => "extrapolated",
-                    Quality::Disabled => "disabled",
-                },
+                quality: QUALITIES[said.quality as usize],
                 torque_from_wind_up_n_m: torque[0],
                 torque_from_wind_up_low_n_m: torque[1],
                 torque_from_wind_up_high_n_m: torque[2],
@@ -359,11 +356,7 @@ pub fn replay(
         torque_counts_from: if has_torque(rows) { "no load" } else { "mean row" },
         torque_turned_rms_arcsec,
         other_load_rms_arcsec,
-        rows_of: None,
-        remarks: Vec::new(),
-        data_faults: Vec::new(),
-        notes: Vec::new(),
-        command: String::new(),
+        ..ReplaySummary::default()
     };
     summary.of_rows(None, table);
     (replayed, summary)

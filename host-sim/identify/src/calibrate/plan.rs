@@ -359,11 +359,8 @@ fn lacks(part: PartName, recorded: &Recorded, prior: &Prior<'_>) -> Option<Strin
 /// Temperatures that are recorded.
 fn temperatures(bench: &Bench) -> Vec<f64> {
     let [cold, warm] = bench.temperature_c;
-    if warm - cold < ONE_TEMPERATURE_K {
-        vec![f64::midpoint(cold, warm)]
-    } else {
-        vec![cold, f64::midpoint(cold, warm), warm]
-    }
+    let middle = f64::midpoint(cold, warm);
+    if warm - cold < ONE_TEMPERATURE_K { vec![middle] } else { vec![cold, middle, warm] }
 }
 
 /// Loads of passes, evenly, so that what no part has is seen between them, and none.

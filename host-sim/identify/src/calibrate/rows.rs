@@ -29,7 +29,7 @@ const SETTLED: f64 = 1.5;
 const SURE: f64 = 3.0;
 
 /// Rows of all files.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Rows {
     pub rows: Vec<Row>,
     /// Session and load, N·m, of each row that was looked at, the unsettled ones among them.
@@ -235,13 +235,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let total: usize = files.iter().flat_map(|file| &file.sessions).map(Session::len).sum();
     let every = one_in(total);
-    let mut all = Rows {
-        rows: Vec::new(),
-        loads: Vec::new(),
-        measured_means_arcsec: Vec::new(),
-        means_arcsec: Vec::new(),
-        by_file: false,
-    };
+    let mut all = Rows::default();
     let mut sessions = 0..;
     for (zero, file) in files.iter().enumerate() {
         let begin = all.rows.len();

@@ -56,7 +56,7 @@ pub struct Split {
 }
 
 /// One of them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SplitPart {
     /// Whose: `encoder_output`, `encoder_generator`, `gear`.
     pub of: &'static str,
@@ -170,13 +170,7 @@ impl SplitWaves<'_> {
     pub fn split(&self, states: &[State], prior: &Prior<'_>) -> (Split, Model) {
         let model = self.model;
         let mut gear = model.clone();
-        let mut parts = [ENCODERS[0].of, ENCODERS[1].of, GEAR].map(|of| SplitPart {
-            of,
-            rms_arcsec: 0.0,
-            half_width_arcsec: 0.0,
-            not_told: None,
-            shares: Vec::new(),
-        });
+        let mut parts = [ENCODERS[0].of, ENCODERS[1].of, GEAR].map(|of| SplitPart { of, ..SplitPart::default() });
         // What may be the gear's of the waves of each encoder, mean squares.
         let mut open = [0.0; 2];
         let mut owner = vec![2; model.coefficients.len()];

@@ -147,12 +147,9 @@ impl ExtendedTables<'_> {
         let friction = self.nominal.friction_torque_n_m.max(LEAST_FRICTION * largest);
         let torques = torque_nodes(friction, largest.max(3.0 * friction));
         let [low, high] = self.temperatures_c;
-        let temperatures = if high - low > ONE_TEMPERATURE_K {
-            vec![low as f32, high as f32]
-        } else {
-            vec![f64::midpoint(low, high) as f32]
-        };
-        (torques, temperatures)
+        let middle = f64::midpoint(low, high);
+        let temperatures = if high - low > ONE_TEMPERATURE_K { vec![low, high] } else { vec![middle] };
+        (torques, temperatures.into_iter().map(|celsius| celsius as f32).collect())
     }
 
     /// A table called `of` of what is predicted for sessions: by the nominal model, and in all, arcsec.

@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::relation::{TOGETHER, slope};
-use super::turns::{Units, on_one_shaft, settle, units_of_pair};
+use super::turns::{AngleUnit, on_one_shaft, settle, units_of_pair};
 use super::{Guess, Rival, Role};
 use crate::measurement::{Family, Unit, least_and_most};
 
@@ -24,7 +24,8 @@ const SAID: usize = 3;
 struct Pair {
     generator: usize,
     output: usize,
-    units: Units,
+    units: [AngleUnit; 2],
+    ratio: Option<f64>,
     /// In the order of [`WHY`]: of two pairs the first reason that differs decides. The last is the share of the range
     /// that a straight line leaves, negative.
     reasons: [f64; WHY.len()],
@@ -51,9 +52,9 @@ impl Pair {
     /// It as a rival of the pair proposed.
     fn rival(&self, proposed: &Pair, guesses: &[Guess]) -> Rival {
         let [generator, output] = [self.generator, self.output].map(|k| guesses[k].name.clone());
-        let written = self.units.generator.written().zip(self.units.output.written());
-        let columns_option = written.map(|(g, o)| format!("generator={generator}:{g},output={output}:{o}"));
-        Rival { generator, output, ratio: self.units.ratio, columns_option, why: proposed.before(self).to_owned() }
+        let [g, o] = self.units.map(|unit| unit.written());
+        let columns_option = g.zip(o).map(|(g, o)| format!("generator={generator}:{g},output={output}:{o}"));
+        Rival { generator, output, ratio: self.ratio, columns_option, why: proposed.before(self).to_owned() }
     }
 }
 
@@ -67,13 +68,13 @@ pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f6
     let mut pairs = pairs(guesses);
     pairs.sort_by(|a, b| b.reasons.partial_cmp(&a.reasons).unwrap_or(std::cmp::Ordering::Equal));
     let Some((best, others)) = pairs.split_first() else { return (None, Vec::new()) };
-    let (g, o, units) = (best.generator, best.output, best.units);
+    let Pair { generator: g, output: o, units, ratio, .. } = *best;
     // What shows the same two shafts once more is no rival.
     let same = |a: usize, b: usize| a == b || on_one_shaft(&guesses[a], &guesses[b]).is_some();
     let level = others.iter().filter(|other| other.reasons[..2] == best.reasons[..2]);
     let level = level.filter(|other| !(same(other.generator, g) && same(other.output, o)));
     let rivals: Vec<Rival> = level.map(|other| other.rival(best, guesses)).collect();
-    for (k, role, other, unit) in [(g, Role::Generator, o, units.generator), (o, Role::Output, g, units.output)] {
+    for (k, role, other, unit) in [(g, Role::Generator, o, units[0]), (o, Role::Output, g, units[1])] {
         let guess = &mut guesses[k];
         if guess.column.role == Role::Command {
             notes.push(format!("column {} is a command, which stands for the angle of the generator", k + 1));
@@ -85,7 +86,7 @@ pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f6
         };
         (guess.column.role, guess.column.used) = (role, true);
         settle(guess, k, &unit, notes);
-        guess.because(format!("turns with column {}{}", other + 1, to_one(units.ratio, 3)), sure);
+        guess.because(format!("turns with column {}{}", other + 1, to_one(ratio, 3)), sure);
         if let Some(first) = rivals.first() {
             guess.column.why.push(format!("{} and {} may be meant as well", first.generator, first.output));
         }
@@ -100,7 +101,7 @@ pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f6
             o + 1
         ));
     }
-    (units.ratio, rivals)
+    (ratio, rivals)
 }
 
 /// The numbers of the joints whose generator and output are used.
@@ -131,7 +132,7 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
             }
             let line = slope(&o.values, &g.values, &g.of_file).filter(|(_, left)| *left < TOGETHER);
             let Some((slope, left)) = line else { continue };
-            let Some(units) = units_of_pair(g, o, 1.0 / slope) else { continue };
+            let Some((units, ratio)) = units_of_pair(g, o, 1.0 / slope) else { continue };
             let yes = |is: bool| f64::from(u8::from(is));
             let named = |guess: &Guess| 2.0 * yes(shafts(guess)) + yes(guess.said.angle);
             let reasons = [
@@ -142,7 +143,7 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
                 yes(g.unit == o.unit),
                 -left,
             ];
-            pairs.push(Pair { generator, output, units, reasons });
+            pairs.push(Pair { generator, output, units, ratio, reasons });
         }
     }
     pairs

@@ -90,30 +90,22 @@ impl AngleUnit {
     }
 }
 
-/// Units of generator and output, and the ratio that they give, where they are known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Units {
-    pub generator: AngleUnit,
-    pub output: AngleUnit,
-    pub ratio: Option<f64>,
-}
-
-/// The units of two columns as generator and output; `raw` is the change of the generator's number for one of the
-/// output's. None if the ratio is not one of a strain wave gear.
-pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Option<Units> {
+/// The units of two columns as generator and output, and the ratio that they give, where they are known; `raw` is the
+/// change of the generator's number for one of the output's. None if the ratio is not one of a strain wave gear.
+pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Option<([AngleUnit; 2], Option<f64>)> {
     // Counts of the other encoder are taken if they make such a ratio, else they are asked.
     let found = [true, false].map(|alike| {
-        let [generator, output] = [unit_of(generator, output, alike), unit_of(output, generator, alike)];
-        let ratio = match [generator, output].map(|of| rad(of.unit?, of.counts)) {
+        let units = [unit_of(generator, output, alike), unit_of(output, generator, alike)];
+        let ratio = match units.map(|of| rad(of.unit?, of.counts)) {
             [Some(g), Some(o)] => Some(raw * g / o),
             // Both are counts, of encoders that are taken to be alike.
             [None, None] => Some(raw),
             _ => None,
         };
-        Units { generator, output, ratio }
+        (units, ratio)
     });
-    let fits = |units: &Units| units.ratio.is_none_or(|ratio| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs()));
-    found.into_iter().find(fits)
+    let fits = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
+    found.into_iter().find(|(_, ratio)| ratio.is_none_or(fits))
 }
 
 /// The unit of a column together with another one: radians, or the same counts if they are `alike`, where the file does

@@ -232,19 +232,13 @@ pub(super) fn unwrap(log: &mut Log, columns: &[MappedColumn], ratio: f64, notes:
             notes.push(format!("{} {what}: it was made continuous", column.name));
         } else if within_a_turn(&values, channel, ratio, log) {
             let output = log.get(Quantity::Output).filter(|_| channel == Quantity::Generator);
-            let helped = output.is_some();
+            let helped = "turns are counted by the output angle";
+            let count = output.map_or("the count of its turns is not certain", |_| helped);
             let ambiguous = along(&mut values, log, ratio, output);
             notes.push(format!("{} is within one turn: it was made continuous", column.name));
             if ambiguous {
-                notes.push(format!(
-                    "{} moves by more than {UNAMBIGUOUS} turns from row to row: {}",
-                    column.name,
-                    if helped {
-                        "turns are counted by the output angle"
-                    } else {
-                        "the count of its turns is not certain"
-                    }
-                ));
+                let name = &column.name;
+                notes.push(format!("{name} moves by more than {UNAMBIGUOUS} turns from row to row: {count}"));
             }
         }
         log.put(channel, values);
