@@ -6,7 +6,7 @@ use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::measurement::Session;
 use flexspline_identify::nominal::Nominal;
-use flexspline_identify::residual::{Axis, OrderSpectrum, Picture, harmonics, order_spectrum};
+use flexspline_identify::residual::{Axis, OrderSpectrum, Picture, SizeMismatch, harmonics, order_spectrum};
 use flexspline_identify::synthesize::catalogue_drive;
 use flexspline_tests::seeds;
 
@@ -135,7 +135,7 @@ fn noise_shows_no_line_white_or_wandering() {
 }
 
 /// The picture of a residual, rad, one value for each row of the sessions.
-fn picture(sessions: &[Session], residual_rad: &[f64]) -> Result<Picture, String> {
+fn picture(sessions: &[Session], residual_rad: &[f64]) -> Result<Picture, SizeMismatch> {
     let nominal = Nominal { ratio: RATIO, teeth: None, ..catalogue_drive() };
     let residual_arcsec: Vec<f64> = residual_rad.iter().map(|value| value / ARCSEC).collect();
     Picture::of(&Rows::new(sessions, &nominal), &residual_arcsec, RATIO)

@@ -142,25 +142,23 @@ impl RowsOf {
         of_these.then_some(RowsOf { rows_blake3, ..rows })
     }
 
-    /// That these rows are of the drive and the generator that a table was made of.
-    ///
-    /// # Errors
-    /// They are not, or the table names no generator that is simulated.
-    pub fn check(&self, table: &Table<'_>) -> Result<(), String> {
+    /// Why these rows are not of the drive and the generator that a table was made of, or the table names no generator
+    /// that is simulated.
+    #[must_use]
+    pub fn problem(&self, table: &Table<'_>) -> Option<String> {
         let hash = blake3::Hash::from(table.drive_hash()).to_hex().to_string();
         let generator = generator_of(table).map_or_else(|| "an unknown generator".to_owned(), |kind| kind.to_string());
-        if (hash.as_str(), generator.as_str()) == (self.drive_hash.as_str(), self.generator.as_str()) {
-            return Ok(());
-        }
-        Err(format!(
-            "the rows are of the drive {} (BLAKE3 {}) under {}, according to {} next to them; the table is of a drive \
-             with ratio {} and BLAKE3 {hash} under {generator}",
-            self.drive,
-            self.drive_hash,
-            self.generator,
-            RESULTS[1],
-            table.drive().exact_ratio()
-        ))
+        ((&hash, &generator) != (&self.drive_hash, &self.generator)).then(|| {
+            format!(
+                "the rows are of the drive {} (BLAKE3 {}) under {}, according to {} next to them; the table is of a \
+                 drive with ratio {} and BLAKE3 {hash} under {generator}",
+                self.drive,
+                self.drive_hash,
+                self.generator,
+                RESULTS[1],
+                table.drive().exact_ratio()
+            )
+        })
     }
 }
 
@@ -173,7 +171,7 @@ impl ReplaySummary {
     pub fn of_rows(&mut self, rows_of: Option<RowsOf>, table: &Table<'_>) {
         self.remarks = match &rows_of {
             None => vec![OF_NOBODY.to_owned()],
-            Some(rows) => rows.check(table).err().into_iter().collect(),
+            Some(rows) => rows.problem(table).into_iter().collect(),
         };
         self.remarks.extend(self.of_gain());
         self.rows_of = rows_of;

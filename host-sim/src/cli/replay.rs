@@ -72,8 +72,8 @@ impl Replay {
 impl Replay {
     /// That the rows are of the drive and the generator of the table, as far as anybody says.
     fn check_rows(&self, rows_of: Option<&RowsOf>, table: &Table<'_>) -> Result<(), Failure> {
-        match rows_of.map(|rows| rows.check(table)) {
-            Some(Err(other)) if !self.other_drive => Err(Failure::BadInput(format!(
+        match rows_of.and_then(|rows| rows.problem(table)) {
+            Some(other) if !self.other_drive => Err(Failure::BadInput(format!(
                 "{}: {other}; allowed: the table of that drive, or --other-drive if this is meant",
                 self.data.display()
             ))),

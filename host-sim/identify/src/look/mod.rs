@@ -18,7 +18,9 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::measurement::raw::RawFile;
-use crate::measurement::{APART, MappedColumn, Quantity, ReadRows, Reading, Unit, continued, median_of, sampled};
+use crate::measurement::{
+    APART, MappedColumn, MeasuredError, Quantity, ReadRows, Reading, Unit, continued, median_of, sampled,
+};
 use column::Facts;
 pub(crate) use coverage::Coverage;
 use pair::pair;
@@ -243,15 +245,13 @@ fn used(guesses: &[Guess], role: Role) -> Option<&Guess> {
 ///
 /// # Errors
 /// The files do not have the same columns.
-pub fn look(files: &[RawFile]) -> Result<Looked, String> {
-    let first = files.first().ok_or("no file")?;
+pub fn look(files: &[RawFile]) -> Result<Looked, MeasuredError> {
+    let first = files.first().ok_or_else(|| MeasuredError::of_file("look", &"no file"))?;
     let layout = &first.sheet.layout;
     if let Some(other) = files.iter().find(|other| other.sheet.layout.names != layout.names) {
-        let [first, other] = [first, other].map(|file| (&file.file, file.sheet.layout.names.join(", ")));
-        return Err(format!(
-            "{} has the columns {}, but {} has {}; allowed: logs of one form together",
-            other.0, other.1, first.0, first.1
-        ));
+        let [has, due] = [other, first].map(|file| file.sheet.layout.names.join(", "));
+        let what = format!("columns {has}, but {} has {due}; allowed: logs of one form together", first.file);
+        return Err(MeasuredError::of_file(&other.file, &what));
     }
     let of_file = |file: &RawFile, note: String| if files.len() > 1 { format!("{}: {note}", file.file) } else { note };
     let mut notes: Vec<String> = Vec::new();

@@ -11,7 +11,7 @@ mod rows;
 mod spectrum;
 
 pub use orders::{Line, NamedOrder, harmonics, named_orders};
-pub use rows::Axis;
+pub use rows::{Axis, SizeMismatch};
 pub use spectrum::{OrderSpectrum, Peak, order_spectrum};
 pub(crate) use spectrum::{is_no_noise, strongest};
 
@@ -38,10 +38,10 @@ impl Picture {
     ///
     /// # Errors
     /// There are more values than rows, or fewer.
-    pub fn of(rows: &Rows, residual_arcsec: &[f64], ratio: f64) -> Result<Picture, String> {
+    pub fn of(rows: &Rows, residual_arcsec: &[f64], ratio: f64) -> Result<Picture, SizeMismatch> {
         let (found, needed) = (residual_arcsec.len(), rows.len());
         if found != needed {
-            return Err(format!("{found} values of the residual for {needed} rows"));
+            return Err(SizeMismatch { found, needed });
         }
         let centred = centred_by_direction(rows, residual_arcsec);
         let spectrum = |axis: Axis| order_spectrum(axis, &axis.angles(rows), &centred, ratio);

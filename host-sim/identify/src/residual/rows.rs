@@ -1,6 +1,7 @@
 //! Angles that a residual may be tied to, and its rows by direction.
 
 use serde::Serialize;
+use thiserror::Error;
 
 use crate::diagnosis::rows::Rows;
 use crate::measurement::{directions, median_of, sampled};
@@ -41,6 +42,16 @@ impl Axis {
             Axis::GeneratorLessOutput => rows.generator.iter().zip(output).map(|(psi, delta)| psi - delta).collect(),
         }
     }
+}
+
+/// A residual that does not have one value for each row.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{found} values of the residual for {needed} rows")]
+pub struct SizeMismatch {
+    /// Values found.
+    pub found: usize,
+    /// Rows.
+    pub needed: usize,
 }
 
 /// A residual over the rows less its median in each direction of the generator.
