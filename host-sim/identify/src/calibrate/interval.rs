@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use super::Model;
 use super::folds::{FLOOR, Row};
-use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, usual_arcsec, weights};
+use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, place, usual_arcsec, weights};
 use crate::linear::{Gram, Prior, Solution, solve};
 use crate::measurement::{median_of, white_noise};
 
@@ -331,8 +331,7 @@ impl ModelUncertainty {
 
     /// Standard deviation of a coefficient of a part.
     pub(super) fn std_of(&self, part: PartName, coefficient: usize) -> Option<f64> {
-        let at = self.parts.iter().position(|other| *other == part)?;
-        let place = width_of(&self.parts[..at]) + coefficient;
+        let place = place(self.parts.iter().copied(), part)?.start + coefficient;
         Some(self.covariance[place * width_of(&self.parts) + place].sqrt())
     }
 

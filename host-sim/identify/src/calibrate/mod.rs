@@ -181,11 +181,10 @@ impl Model {
     /// The coefficients that say the same where the generator's angle is larger by this, and the output's with it.
     fn turned(&self, by_rad: f64, ratio: f64) -> Vec<f64> {
         let mut turned = self.coefficients.clone();
-        for (part, width) in self.chosen.iter().map(|chosen| (chosen.part, parts::weights(chosen.part).len())) {
-            let begin = self.of(part).map_or(0, |place| place.start);
+        for part in self.chosen.iter().map(|chosen| chosen.part) {
             let angles = parts::wave_angles(part, by_rad, by_rad / ratio, &self.scales);
             let orders = angles.flat_map(|(angle, orders)| (1..=orders).map(move |k| f64::from(k) * angle));
-            for (pair, by) in turned[begin..begin + width].chunks_exact_mut(2).zip(orders) {
+            for (pair, by) in turned[self.of(part).unwrap_or(0..0)].chunks_exact_mut(2).zip(orders) {
                 let ((sin, cos), [of_sine, of_cosine]) = (by.sin_cos(), [pair[0], pair[1]]);
                 pair.copy_from_slice(&[of_sine * cos + of_cosine * sin, of_cosine * cos - of_sine * sin]);
             }
@@ -200,10 +199,7 @@ impl Model {
 
     /// Where the coefficients of a part stand.
     fn of(&self, part: PartName) -> Option<std::ops::Range<usize>> {
-        let width = |part: PartName| parts::weights(part).len();
-        let at = self.chosen.iter().position(|chosen| chosen.part == part)?;
-        let begin = self.chosen[..at].iter().map(|chosen| width(chosen.part)).sum();
-        Some(begin..begin + width(part))
+        parts::place(self.chosen.iter().map(|chosen| chosen.part), part)
     }
 
     /// Error at rest in one place under a load, arcsec.
@@ -538,15 +534,8 @@ const SET_ANEW: &str = "the zero of the output is another one in each session of
 
 /// A file in pieces, each with one zero: where a session begins another.
 fn by_zeros(file: &Recording, begins: impl Fn(&Session) -> bool) -> Vec<Recording> {
-    let mut pieces: Vec<Recording> = Vec::new();
-    for session in &file.sessions {
-        if pieces.is_empty() || begins(session) {
-            pieces.push(file.with_sessions(Vec::new()));
-        }
-        if let Some(piece) = pieces.last_mut() {
-            piece.sessions.push(session.clone());
-        }
-    }
+    let pieces = file.sessions.chunk_by(|_, next| !begins(next));
+    let mut pieces: Vec<Recording> = pieces.map(|piece| file.with_sessions(piece.to_vec())).collect();
     if let Some(first) = pieces.first_mut() {
         (first.faults, first.notes) = (file.faults.clone(), file.notes.clone());
     }

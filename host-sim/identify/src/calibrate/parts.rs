@@ -4,6 +4,8 @@
 //! Every column is of the order of one, so that a penalty means the same in all parts. The weight of a column within
 //! its part rises with its order: smooth curves cost little, wrinkles much.
 
+use std::ops::Range;
+
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Which part.
@@ -225,6 +227,16 @@ pub(super) fn weights(part: PartName) -> Vec<f64> {
             .flat_map(|k| [f64::from(k).powi(WAVE_POWER); 2])
             .collect(),
     }
+}
+
+/// Where the columns of a part stand among those of some parts.
+pub(super) fn place(parts: impl IntoIterator<Item = PartName>, part: PartName) -> Option<Range<usize>> {
+    let mut end = 0;
+    parts.into_iter().find_map(|other| {
+        let begin = end;
+        end += weights(other).len();
+        (other == part).then_some(begin..end)
+    })
 }
 
 /// How far from a straight line the wind-up is before loads between say it, of the straight part: a spring of the

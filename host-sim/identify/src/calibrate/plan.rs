@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use super::interval::{Node, RowNoise, planned_covariance, row_of_group, spread, width_of, widths};
-use super::parts::{PartName, Scales, State, weights};
+use super::parts::{PartName, Scales, State, place, weights};
 use super::rows::{MOST_ROWS, Recorded, late_s};
 use super::{CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH};
 use crate::linear::Gram;
@@ -89,7 +89,8 @@ impl Bench {
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let length = [self.output_deg[1] - self.output_deg[0]];
-        let within: [(&str, &[f64], [f64; 2]); 8] = [
+        let any = [f64::NEG_INFINITY, f64::INFINITY];
+        let within: [(&str, &[f64], [f64; 2]); 9] = [
             ("--minutes", &[self.minutes], [1.0, 1e5]),
             ("--rate", &[self.rate_hz], [0.1, 1e6]),
             ("--speed-rpm", &[self.speed_rpm], [1e-3, FASTEST_RPM]),
@@ -97,16 +98,14 @@ impl Bench {
             ("--wander-arcsec", &[self.wander_arcsec], [0.0, 1e4]),
             ("--load-n-m", &self.torque_n_m, LOADS_N_M),
             ("--temperatures-c", &self.temperature_c, TEMPERATURES_C),
+            ("--travel-deg", &self.output_deg, any),
             ("--travel-deg (its length)", &length, [1.0, 3.6e4]),
         ];
-        let rising = [
-            ("--load-n-m", self.torque_n_m),
-            ("--temperatures-c", self.temperature_c),
-            ("--travel-deg", self.output_deg),
-        ];
-        let falls = rising.into_iter().find(|(_, [low, high])| !(low.is_finite() && high.is_finite() && low <= high));
-        let falls =
-            falls.map(|(name, [low, high])| format!("{name}: found {low} and {high}, allowed: the lower first"));
+        let falls = within.iter().find_map(|(name, values, _)| {
+            let &[low, high] = *values else { return None };
+            let rises = low.is_finite() && high.is_finite() && low <= high;
+            (!rises).then(|| format!("{name}: found {low} and {high}, allowed: the lower first"))
+        });
         falls.or_else(|| {
             within.into_iter().find_map(|(name, values, [low, high])| {
                 let bad = values.iter().find(|value| !(low..=high).contains(*value))?;
@@ -319,8 +318,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench) -> Result<Planned, CalibrationErro
 fn asked(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[PartName]) -> Gram {
     let mut moment = Gram::none(width_of(chosen) + 2);
     // The zero by temperature: logs of one temperature each cannot tell it from the encoder's.
-    let warmth = chosen.iter().position(|part| *part == PartName::Temperature);
-    let zero = warmth.map(|at| 1 + width_of(&chosen[..at]));
+    let zero = place(chosen.iter().copied(), PartName::Temperature).map(|place| 1 + place.start);
     for at in spread(scales, ratio, travel, ASKED) {
         let mut row = row_of_group(chosen, &at, scales, 0.0);
         zero.into_iter().for_each(|zero| row[zero] = 0.0);
