@@ -79,7 +79,6 @@ pub(crate) enum Kin {
 impl Kin {
     /// How much of what one is wrong by may look like the other. That it is all of it for kin is the definition; the
     /// rest is *chosen*, on cases that a state before got wrong (`docs/evidence/diagnosis.md`).
-    #[must_use]
     pub(crate) fn share(self, other: Kin) -> f64 {
         match (self, other) {
             (_, Kin::Pulse) | (Kin::Pulse, Kin::Shape) | (Kin::Friction, Kin::Torque) => 1.0,
@@ -150,7 +149,6 @@ impl Need {
     }
 
     /// The recording, or the number, that would meet it; none where no recording does at will.
-    #[must_use]
     pub(crate) const fn remedy(self) -> Option<&'static str> {
         self.row().1
     }
@@ -191,7 +189,6 @@ shown_by_name!(CauseName::as_str);
 
 impl CauseName {
     /// Its entry in the table of causes.
-    #[must_use]
     pub(crate) fn spec(self) -> &'static CauseSpec {
         self.row()
     }

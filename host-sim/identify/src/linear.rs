@@ -88,7 +88,6 @@ impl Gram {
 ///
 /// Rows are taken in blocks that stay in the cache while all pairs meet, with the widest registers that the machine
 /// has.
-#[must_use]
 pub(crate) fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, own: bool) -> Vec<f64> {
     static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
     let mut sums = vec![0.0; a.len() * b.len()];
@@ -192,7 +191,6 @@ pub(crate) struct Solution {
 
 impl Solution {
     /// Covariance of the coefficients, row by row.
-    #[must_use]
     pub(crate) fn covariance(&self) -> Vec<f64> {
         let (inverse, scale) = (self.factor.inverse(), &self.scale);
         let row = |i: usize| (0..scale.len()).map(move |j| (i, j));
@@ -204,7 +202,6 @@ impl Solution {
 /// taken for.
 ///
 /// `None` if the products are not finite.
-#[must_use]
 pub(crate) fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solution> {
     let n = priors.len();
     debug_assert_eq!(gram.size, n + 1);

@@ -64,7 +64,6 @@ impl Evaluation {
     /// Tables that leave less than none, and less than this share of the squares that the nominal one leaves; the best
     /// first, with what they leave, arcsec rms. That of the causes comes first unless the calibrated one is better by
     /// what counts as a gain: it holds beyond the rows.
-    #[must_use]
     pub(crate) fn tables_that_gain(&self, most_of_nominal: f64) -> Vec<(TableKind, f64)> {
         let less = |left: f64, than: f64| left * left < (1.0 - LEAST_GAIN) * than * than;
         let (none, nominal) = (self.left.rms_uncompensated_arcsec, self.left.rms_nominal_tables_arcsec);
@@ -78,7 +77,6 @@ impl Evaluation {
     }
 
     /// What is left with each table, for a reader.
-    #[must_use]
     pub(crate) fn words(&self) -> String {
         let or_none = |left: Option<f64>| left.map_or("no table".to_owned(), |left| format!("{left:.2}"));
         let left = self.left;

@@ -100,7 +100,6 @@ impl Model {
     }
 
     /// The nominal model recalibrated, with the causes of a diagnosis as they were fitted.
-    #[must_use]
     pub(crate) fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis, fitted: &Extended) -> Model {
         let of = |cause: &Cause| {
             let entry = CauseEntry::of(cause.name, &cause.parameters);
@@ -264,7 +263,6 @@ fn numbered(parameters: &BTreeMap<String, Parameter>, name: &str) -> Vec<f64> {
 
 impl CauseEntry {
     /// A cause with the parameters that were found.
-    #[must_use]
     pub(crate) fn of(name: CauseName, parameters: &BTreeMap<&'static str, Parameter>) -> CauseEntry {
         let parameters = parameters.iter().map(|(name, found)| ((*name).to_owned(), found.value)).collect();
         CauseEntry { name, parameters, fit: None }

@@ -87,7 +87,6 @@ pub struct ExtendedTables<'a> {
 
 impl ExtendedTables<'_> {
     /// Why a cause is not in a table of this drive, if it is not; of the encoder, whether it is that of the output.
-    #[must_use]
     pub(crate) fn left_out(&self, cause: CauseName, at_output: bool) -> Option<&'static str> {
         match cause.spec().in_table {
             InTable::Yes if at_output => Some(OF_THE_OUTPUT_ENCODER),

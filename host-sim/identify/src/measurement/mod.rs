@@ -144,7 +144,6 @@ impl Session {
     }
 
     /// Some of its rows as a session.
-    #[must_use]
     pub(crate) fn part(&self, rows: Range<usize>) -> Session {
         self.each(self.line[rows.clone()].to_vec(), |values| values[rows.clone()].to_vec())
     }
@@ -225,7 +224,6 @@ pub struct Recording {
 
 impl Recording {
     /// The same file with these sessions, none of its faults reported again.
-    #[must_use]
     pub(crate) fn with_sessions(&self, sessions: Vec<Session>) -> Recording {
         let (file, unusable) = (self.file.clone(), self.unusable.clone());
         Recording { file, rows: self.rows, sessions, unusable, ..Recording::default() }

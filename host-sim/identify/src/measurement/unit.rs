@@ -136,7 +136,6 @@ impl Unit {
     }
 
     /// A unit as it stands in a line of units, with or without brackets.
-    #[must_use]
     pub(crate) fn in_brackets(field: &str) -> Option<Unit> {
         Unit::written(super::reader::unit_word(field))
     }
@@ -167,7 +166,6 @@ impl Unit {
     }
 
     /// The unit that a column is in if its name says it: `wave_gen_turn`, `error_arcsec`, `Winkel [deg]`, `load (Nm)`.
-    #[must_use]
     pub(crate) fn in_name(column: &str) -> Option<Unit> {
         if let Some(text) = Unit::bracketed(column) {
             return Unit::written(text);

@@ -267,7 +267,6 @@ impl Columns {
 
 impl Cells {
     /// A sentence on the cells that were beyond the range.
-    #[must_use]
     pub(crate) fn over_note(&self, name: &str) -> Option<String> {
         let FoundCell { line, text } = self.over.first.as_ref()?;
         let (count, text) = (self.over.count, shortened(text));
