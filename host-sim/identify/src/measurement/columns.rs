@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::Refusal;
 use super::reader::{Layout, unit_word};
 use super::unit::Family;
 pub use super::unit::{Reading, Unit};
@@ -288,7 +289,7 @@ fn by_number(name: &str, columns: usize) -> Option<usize> {
 }
 
 /// The reading by the line of units below the names; none where it has no word for the column, or a bare number.
-fn unit_below(quantity: Quantity, place: usize, layout: &Layout) -> Result<Option<Reading>, String> {
+fn unit_below(quantity: Quantity, place: usize, layout: &Layout) -> Result<Option<Reading>, Refusal> {
     let word = layout.units.get(place).map_or("", |unit| unit_word(unit));
     let written = !["", "-", "1"].contains(&word);
     written.then(|| Reading::parse(word, quantity.family(), None)).transpose()

@@ -48,6 +48,11 @@ const MANY_SESSIONS: usize = 50;
 pub(crate) const APART: &str = ": they are never recorded in one row; allowed: both in a row, in pandas: df[OUTPUT] = \
                                 df.set_index(TIME)[OUTPUT].interpolate(\"index\").values";
 
+/// Why rows, or a unit, are refused: what was found and what is allowed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Refusal(pub(crate) String);
+
 /// Rows without a gap, in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Session {
@@ -264,10 +269,10 @@ pub(crate) fn parse_at_least(
     columns: &ColumnMap,
     gear: &Gear,
 ) -> Result<Recording, MeasuredError> {
-    let refuse = |why: String| MeasuredError::of_file(file, &why);
+    let refuse = |why: Refusal| MeasuredError::of_file(file, &why);
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         let what = format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio);
-        return Err(refuse(what));
+        return Err(refuse(Refusal(what)));
     }
     let mut findings = Findings::default();
     let (mut log, columns) = log::read(file, bytes.into(), columns, gear.ratio, fewest, &mut findings)?;
@@ -300,7 +305,7 @@ pub(crate) fn parse_at_least(
 ///
 /// # Errors
 /// The time looks as if it were in another unit.
-fn in_order(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings) -> Result<String, String> {
+fn in_order(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings) -> Result<String, Refusal> {
     faults::missing::fill(log, findings);
     faults::clock::check(log, columns, findings)?;
     let recorded = recorded(log);
@@ -356,15 +361,17 @@ fn recorded(log: &Log) -> String {
 }
 
 /// Whether enough rows are left, and anything moves in them.
-fn enough(log: &Log, recorded: &str, fewest: usize) -> Result<(), String> {
+fn enough(log: &Log, recorded: &str, fewest: usize) -> Result<(), Refusal> {
     if log.len() < fewest {
         let rows = log.len();
-        return Err(format!("{rows} rows have all that is needed; at least {fewest} must ({recorded})"));
+        return Err(Refusal(format!("{rows} rows have all that is needed; at least {fewest} must ({recorded})")));
     }
     let constant = |channel| log.get(channel).is_some_and(|values| values.iter().all(|value| *value == values[0]));
     let follower = log.output_or_error();
     if constant(Quantity::Generator) && constant(follower) {
-        return Err(format!("generator and {follower} keep one value throughout; at least one of them must change"));
+        return Err(Refusal(format!(
+            "generator and {follower} keep one value throughout; at least one of them must change"
+        )));
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::Refusal;
 use flexspline_base::suggest::did_you_mean;
 
 table! {
@@ -214,7 +215,7 @@ impl Reading {
     ///
     /// # Errors
     /// The text found and what is allowed.
-    pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, String> {
+    pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, Refusal> {
         let text = text.trim();
         if let Some(unit) = Unit::written(text).filter(|unit| unit.family() == allowed) {
             return Reading::of(unit).complete(false, torque_per_ampere);
@@ -222,15 +223,17 @@ impl Reading {
         let (sign, rest) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest.trim_start()));
         let end = rest.find(['*', '/', '+', '-']).unwrap_or(rest.len());
         let word = rest[..end].trim();
-        let unit = Unit::written(word).filter(|unit| unit.family() == allowed).ok_or_else(|| allowed.refusal(word))?;
+        let unit = Unit::written(word)
+            .filter(|unit| unit.family() == allowed)
+            .ok_or_else(|| Refusal(allowed.refusal(word)))?;
         let (mut gain, mut offset, mut scaled) = (sign, 0.0, false);
         let mut rest = rest[end..].trim_start();
         while let Some(operator) = rest.chars().next() {
             let (number, after) = leading_number(rest[1..].trim_start()).ok_or_else(|| {
-                format!(
+                Refusal(format!(
                     "found \"{rest}\" after the unit, allowed: *, /, + or - and a number, for instance count/16777216 \
                      or V*20-0.4"
-                )
+                ))
             })?;
             match operator {
                 '*' => (gain, offset, scaled) = (gain * number, offset * number, true),
@@ -241,20 +244,20 @@ impl Reading {
             rest = after.trim_start();
         }
         if !(gain.is_finite() && offset.is_finite() && gain != 0.0) {
-            return Err(format!("found \"{text}\", allowed: a gain that is finite and not zero"));
+            return Err(Refusal(format!("found \"{text}\", allowed: a gain that is finite and not zero")));
         }
         Reading { unit, gain, offset }.complete(scaled, torque_per_ampere)
     }
 
     /// With the gain that a current has by `torque_per_ampere`, or the error that one is missing.
-    fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, String> {
+    fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, Refusal> {
         let Some(needs) = self.unit.needs_gain().filter(|_| !scaled) else { return Ok(self) };
         let ampere = match self.unit {
             Unit::Ampere => torque_per_ampere,
             Unit::Milliampere => torque_per_ampere.map(|torque| 1e-3 * torque),
             _ => None,
         };
-        self.gain *= ampere.ok_or_else(|| format!("{} needs a number: {needs}", self.unit))?;
+        self.gain *= ampere.ok_or_else(|| Refusal(format!("{} needs a number: {needs}", self.unit)))?;
         Ok(self)
     }
 }
@@ -332,7 +335,7 @@ mod tests {
             ("deg", Family::Time, "found the unit \"deg\", allowed: s, ms"),
         ] {
             match Reading::parse(text, allowed, None) {
-                Err(what) => assert!(what.contains(said), "{text}: {what}"),
+                Err(Refusal(what)) => assert!(what.contains(said), "{text}: {what}"),
                 other => panic!("{text}: {other:?}"),
             }
         }

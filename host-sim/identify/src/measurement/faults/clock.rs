@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use super::{Findings, marked};
+use crate::measurement::Refusal;
 use crate::measurement::columns::{MappedColumn, Quantity};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
@@ -52,7 +53,7 @@ pub(in crate::measurement) fn check(
     log: &mut Log,
     columns: &[MappedColumn],
     findings: &mut Findings,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     if log.get(Quantity::Time).is_none() {
         return Ok(());
     }
@@ -270,7 +271,7 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
 }
 
 /// A period that does not exist, or a creep to and fro: a unit of time taken for another.
-fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findings) -> Result<(), String> {
+fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findings) -> Result<(), Refusal> {
     let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return Ok(()) };
     let mut speeds: Vec<f64> = (1..time.len())
         .filter(|row| log.continues(*row) && time[*row] > time[*row - 1])
@@ -293,11 +294,11 @@ fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findin
     if let Some(column) = column.filter(|_| to_and_fro && smoothly && creeps) {
         let (column, rows, hours) = (&column.name, time.len(), lasts_s / 3600.0);
         findings.milliseconds = true;
-        return Err(format!(
+        return Err(Refusal(format!(
             "{column}: {rows} rows {period:.3} s apart, {hours:.1} hours in which the generator hardly exceeds \
              {fastest:.3} rad/s and turns round over many rows: milliseconds rather than seconds; allowed: --columns \
              time={column}:ms, or time={column}:s if the motor creeps"
-        ));
+        )));
     }
     let exists = (PERIODS_S[0]..=PERIODS_S[1]).contains(&period);
     let all = log.fault(FaultName::ClockError, 0..log.len()).filter(|_| !exists);

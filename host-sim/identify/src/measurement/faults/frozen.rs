@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::resolution::lattice;
 use super::steps::WHOLE_PITCH;
 use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, straight, whole_pitches};
+use crate::measurement::Refusal;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
@@ -46,7 +47,7 @@ fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
 const SUDDEN: f64 = 0.9;
 
 /// Finds frozen stretches and leaves their rows out; a channel that is frozen throughout is an error.
-pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
     let rows = log.len();
     let (output, generator) = (&log.output_rad(gear.ratio), log.of(Quantity::Generator));
     let outputs_noisy = has_noise(log.pieces(output), NO_NOISE_RAD);
@@ -94,10 +95,10 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     if 2 * left < rows {
         let fault = findings.faults.iter().find(|fault| fault.name == FaultName::FrozenChannel);
         let channel = fault.and_then(|fault| fault.channel).unwrap_or(Quantity::Output);
-        return Err(format!(
+        return Err(Refusal(format!(
             "the {channel} keeps one value over {} of {rows} rows; allowed: at most half of them",
             rows - left
-        ));
+        )));
     }
     saturated(log, &mut drop, findings);
     of_channel(log, Quantity::Torque, &mut drop, findings);

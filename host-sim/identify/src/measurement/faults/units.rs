@@ -7,6 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::{Findings, LineFit, extent};
+use crate::measurement::Refusal;
 use crate::measurement::columns::{MappedColumn, Quantity, Reading, Unit};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
@@ -40,7 +41,7 @@ pub(in crate::measurement) fn check(
     columns: &[MappedColumn],
     gear: &Gear,
     findings: &mut Findings,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     torque(log, columns, gear, findings)?;
     temperature(log, columns, findings);
     if log.output_or_error() == Quantity::Output {
@@ -77,7 +78,7 @@ fn may_be(value: f64, quantity: Quantity, columns: &[MappedColumn], allowed: imp
 }
 
 /// A torque beyond what a drive bears is in another unit, and is not used.
-fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
     let said = columns.iter().any(|column| column.quantity == Quantity::Torque && column.said);
     let limit = if said { Gear::LARGEST_TORQUE_N_M } else { gear.plausible_torque_n_m };
     let Some(values) = log.get(Quantity::Torque) else { return Ok(()) };
@@ -88,7 +89,7 @@ fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut F
     }
     let say_it = may_be(size, Quantity::Torque, columns, |torque| torque <= limit);
     let say_it = say_it.ok_or_else(|| {
-        format!("torque: found {size:e} N·m in a twentieth of the rows, allowed: at most {limit:e} N·m")
+        Refusal(format!("torque: found {size:e} N·m in a twentieth of the rows, allowed: at most {limit:e} N·m"))
     })?;
     let what = format!(
         "torque of {size:.0} N·m, where {limit:.0} N·m is the most: it is in another unit, and is not used{say_it}"
@@ -156,7 +157,7 @@ fn typical_slope(mut pieces: Vec<(f64, f64)>) -> f64 {
     middle.map_or(0.0, |(psi, delta)| delta / psi)
 }
 
-fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
     let Some((slope, psi, travel)) = slope(log) else {
         findings.notes.push("the generator stands still: nothing that turns with it can be seen".to_owned());
         return Ok(());
@@ -191,10 +192,10 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         && travel > SHOWS_THE_WHEEL_RAD
         && (slope * other - 1.0).abs() <= OTHER_WHEEL
     {
-        return Err(format!(
+        return Err(Refusal(format!(
             "{seen}: that is the ratio {other} of the same teeth with the other wheel fixed; allowed: the wheel that \
              is fixed in the drive measured"
-        ));
+        )));
     }
     if (found + 1.0).abs() <= 0.1 {
         let readings = vec![format!("--columns output={output}:-{output_unit}"), format!("the ratio {}", -gear.ratio)];
@@ -217,7 +218,7 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         let why = "one of the two is in another unit, and no size says which for certain";
         return Err(other_reading(&seen, why, &readings));
     }
-    Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
+    Err(Refusal(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
         format!(
             "{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an \
              output that turns"
@@ -229,12 +230,12 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
             RATIO_ERROR[1],
             angles()
         )
-    })
+    }))
 }
 
 /// The refusal of a reading, with the readings that are allowed.
-pub(crate) fn other_reading(seen: &str, why: &str, readings: &[String]) -> String {
-    format!("{seen}: {why}; allowed: {}", readings.join(", or "))
+pub(crate) fn other_reading(seen: &str, why: &str, readings: &[String]) -> Refusal {
+    Refusal(format!("{seen}: {why}; allowed: {}", readings.join(", or ")))
 }
 
 /// The units of angles that one may take for another.
@@ -243,7 +244,7 @@ fn angles() -> String {
 }
 
 /// Whether recorded errors have the size of errors.
-fn error_size(log: &Log, columns: &[MappedColumn]) -> Result<(), String> {
+fn error_size(log: &Log, columns: &[MappedColumn]) -> Result<(), Refusal> {
     let (Some(error), Some(generator)) = (log.get(Quantity::Error), log.get(Quantity::Generator)) else {
         return Ok(());
     };
@@ -258,12 +259,12 @@ fn error_size(log: &Log, columns: &[MappedColumn]) -> Result<(), String> {
     let spread = quantile_of(&mut left, 0.75);
     let (column, given) = column(columns, Quantity::Error);
     if spread > SPREADS_RAD[0] || (spread > 0.0 && spread < SPREADS_RAD[1]) {
-        return Err(format!(
+        return Err(Refusal(format!(
             "{column}: found errors of {:e} {given}, allowed: between a thousandth of an arc-second and ten degrees. \
              Is its unit ({}) right? It is mapped with --columns error=NAME:UNIT",
             spread / given.factor(),
             angles()
-        ));
+        )));
     }
     Ok(())
 }
