@@ -19,7 +19,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use flexspline_mechanics::contact::{BoreContact, BoreLaw};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw, OpenEdges};
 use std::ops::ControlFlow;
 
 use flexspline::Table;
@@ -344,7 +344,7 @@ fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
         let (state, _) = Solver::new(&problem).deform(turned).unwrap();
         let bore = BoreContact::new(&problem.flexspline, 64);
         let mut outward = 0.0;
-        bore.evaluate(BoreLaw::new(1e6, None), &problem.outline, turned, &state.u, |edge| {
+        bore.evaluate(BoreLaw::new(1e6, None), &problem.outline, turned, &state.u, &mut OpenEdges::default(), |edge| {
             let (s, c) = bore.middle_angles[edge.edge].sin_cos();
             outward += (0..3).map(|a| c * edge.force[2 * a] + s * edge.force[2 * a + 1]).sum::<f64>();
         });

@@ -14,7 +14,7 @@
 //! direction or the point of attack of a contact force, weights of the integration, a moment that is not that of the
 //! forces.
 
-use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair, FlankPoint};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair, FlankPoint, OpenEdges};
 use flexspline_mechanics::drive::{Drive, GeneratorKind, GeneratorOutline};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Problem, Solver};
@@ -64,7 +64,7 @@ fn bore(contact: &BoreContact, law: BoreLaw, outline: &GeneratorOutline, psi: f6
         moment: 0.0,
         peaks: vec![],
     };
-    contact.evaluate(law, outline, psi, u, |edge| {
+    contact.evaluate(law, outline, psi, u, &mut OpenEdges::default(), |edge| {
         let unknowns: Vec<usize> =
             contact.edges[edge.edge].iter().flat_map(|n| [2 * *n as usize, 2 * *n as usize + 1]).collect();
         all.energy += edge.energy;

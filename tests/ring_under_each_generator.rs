@@ -17,7 +17,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use flexspline_mechanics::contact::{BoreContact, BoreLaw};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw, OpenEdges};
 use flexspline_mechanics::drive::{Drive, GeneratorKind, NeutralCurve, RingShape};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Problem, Solver, SolverSettings, State};
@@ -137,7 +137,7 @@ fn quadrant_force(problem: &Problem, settings: &SolverSettings, state: &State) -
     let bore = BoreContact::new(&problem.flexspline, settings.bore_points(problem.kind));
     let law = BoreLaw::new(settings.bore_penalty(problem.kind), None);
     let mut sum = 0.0;
-    bore.evaluate(law, &problem.outline, 0.0, &state.u, |edge| {
+    bore.evaluate(law, &problem.outline, 0.0, &state.u, &mut OpenEdges::default(), |edge| {
         let angle = bore.middle_angles[edge.edge].rem_euclid(std::f64::consts::TAU);
         if angle < std::f64::consts::FRAC_PI_2 {
             let [x, y] = [0, 1].map(|k| edge.force[k] + edge.force[2 + k] + edge.force[4 + k]);

@@ -18,7 +18,7 @@ use super::pack::Packed;
 use super::sleeve_view::SleeveView;
 use flexspline_design::simulate::stress::nodal_von_mises;
 use flexspline_design::simulate::{Observation, Path, Row, SimulateError, SimulationSettings, simulate};
-use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair, OpenEdges};
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Side};
 use flexspline_mechanics::mesh::{MeshError, WheelMesh, rotate};
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings, State};
@@ -245,7 +245,7 @@ fn bore_forces(problem: &Problem, state: &State, teeth: usize) -> Vec<[f64; 2]> 
     let width = problem.drive.flexspline.width_mm;
     let per_sector = bore.edges.len() / problem.flexspline.teeth;
     let mut forces = vec![[0.0; 2]; teeth];
-    bore.evaluate(law, &problem.outline, state.generator_rad, &state.u, |edge| {
+    bore.evaluate(law, &problem.outline, state.generator_rad, &state.u, &mut OpenEdges::default(), |edge| {
         if let Some(sum) = forces.get_mut(edge.edge / per_sector) {
             for (k, force) in edge.force.iter().enumerate() {
                 sum[k % 2] += force * width;

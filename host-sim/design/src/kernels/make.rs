@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::{Eccentric, KERNELS_SCHEMA, Kernels, LoadKernels, WheelKernels};
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, OpenEdges};
 use flexspline_mechanics::drive::{AsBuilt, Drive, GeneratorKind, Side};
 use flexspline_mechanics::mesh::rotate;
 use flexspline_mechanics::motion::Motion;
@@ -270,7 +270,7 @@ impl Forces {
         let width = problem.drive.flexspline.width_mm;
         let per_sector = bore.edges.len() / problem.flexspline.teeth;
         let n = self.generator.len();
-        bore.evaluate(law, &problem.outline, state.generator_rad, &state.u, |edge| {
+        bore.evaluate(law, &problem.outline, state.generator_rad, &state.u, &mut OpenEdges::default(), |edge| {
             let sector = edge.edge / per_sector;
             let force = [0, 1].map(|k| edge.force[k] + edge.force[2 + k] + edge.force[4 + k]);
             self.generator[(positions * sector + n - position) % n] += width * force[0].hypot(force[1]);

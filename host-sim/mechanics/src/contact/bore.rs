@@ -98,20 +98,9 @@ impl BoreContact {
     }
 
     /// Contact of the bore displaced by `u` (x and y of each node) with the generator turned by `generator_rad`, edge
-    /// by edge; edges without contact are not reported.
+    /// by edge; edges without contact are not reported. Passes over edges that `open` knows to be open, and updates it
+    /// for others.
     pub fn evaluate(
-        &self,
-        law: BoreLaw,
-        outline: &GeneratorOutline,
-        generator_rad: f64,
-        u: &[f64],
-        report: impl FnMut(&BorePressure),
-    ) {
-        self.evaluate_near(law, outline, generator_rad, u, &mut OpenEdges::default(), report);
-    }
-
-    /// [`BoreContact::evaluate`] that passes over edges that `open` knows to be open, and updates it for others.
-    pub(crate) fn evaluate_near(
         &self,
         law: BoreLaw,
         outline: &GeneratorOutline,
@@ -246,7 +235,7 @@ mod tests {
         let u = vec![0.0; 2 * mesh.nodes.len()];
         for turned in [0.0, 0.7, 0.7 + std::f64::consts::PI] {
             let (mut sum, mut outward, mut moment) = ([0.0; 2], 0.0, 0.0);
-            bore.evaluate(BoreLaw::new(1e4, None), &outline, turned, &u, |edge| {
+            bore.evaluate(BoreLaw::new(1e4, None), &outline, turned, &u, &mut OpenEdges::default(), |edge| {
                 let angle = bore.middle_angles[edge.edge];
                 assert!((2.0 * (angle - turned)).cos() > 0.9, "contact at {angle}, generator at {turned}");
                 let (s, c) = angle.sin_cos();

@@ -501,30 +501,23 @@ impl<'p> Solver<'p> {
         let bore_nodes = &problem.wheels().0.nodes;
         let major = [state.generator_rad.cos(), state.generator_rad.sin()];
         let wheels = self.wheels.as_mut();
-        problem.bore.evaluate_near(
-            bore_law,
-            &problem.outline,
-            state.generator_rad,
-            &state.u,
-            &mut near.bore,
-            |contact| {
-                for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
-                    for k in 0..2 {
-                        let f = contact.force[2 * a + k];
-                        residual.force[2 * n as usize + k] += f;
-                        residual.scale = residual.scale.max(f.abs());
-                    }
-                    let [x, y] = bore_nodes[n as usize];
-                    if major[0] * x + major[1] * y > 0.0 {
-                        residual.lobe_force += major[0] * contact.force[2 * a] + major[1] * contact.force[2 * a + 1];
-                    }
+        problem.bore.evaluate(bore_law, &problem.outline, state.generator_rad, &state.u, &mut near.bore, |contact| {
+            for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
+                for k in 0..2 {
+                    let f = contact.force[2 * a + k];
+                    residual.force[2 * n as usize + k] += f;
+                    residual.scale = residual.scale.max(f.abs());
                 }
-                wheels.add_bore(contact);
-                residual.generator_moment += contact.moment;
-                residual.generator_contacts += 1;
-                residual.bore_peak = residual.bore_peak.max(contact.peak);
-            },
-        );
+                let [x, y] = bore_nodes[n as usize];
+                if major[0] * x + major[1] * y > 0.0 {
+                    residual.lobe_force += major[0] * contact.force[2 * a] + major[1] * contact.force[2 * a + 1];
+                }
+            }
+            wheels.add_bore(contact);
+            residual.generator_moment += contact.moment;
+            residual.generator_contacts += 1;
+            residual.bore_peak = residual.bore_peak.max(contact.peak);
+        });
         self.slipping.clear();
         let slipping = &mut self.slipping;
         let at = configuration(state);
