@@ -15,7 +15,6 @@
 
 use flexspline_mechanics::fem::element::{
     GaussPoint, PACKED, add_tangent_and_force, cauchy_stress, gauss_points, linear_stiffness, shape, shape_gradient,
-    strain_energy,
 };
 use flexspline_mechanics::fem::material::PlaneStrain;
 use flexspline_mechanics::fem::{Cholesky, Factor, Pattern};
@@ -224,8 +223,6 @@ fn a_rigid_motion_is_free_of_stress() {
             let mut force = [0.0; 16];
             add_tangent_and_force(&mesh.gauss[e], &steel(), &mesh.local(e, &u), &mut [0.0; PACKED], &mut force);
             worst = force.iter().fold(worst, |m, f| m.max(f.abs()));
-            let energy = strain_energy(&mesh.gauss[e], &steel(), &mesh.local(e, &u));
-            assert!(energy < 1e-20 * 206_000.0, "turned by {angle}: energy {energy}");
         }
     }
     println!("rigid motion: forces up to {:.1e} of E times 1 mm", worst / 206_000.0);

@@ -201,18 +201,6 @@ pub fn linear_stiffness(points: &[GaussPoint; 4], material: &PlaneStrain) -> [f6
     stiffness
 }
 
-/// Strain energy (N mm per mm of width) of the displacements `u`.
-pub fn strain_energy(points: &[GaussPoint; 4], material: &PlaneStrain, u: &[f64; 16]) -> f64 {
-    points
-        .iter()
-        .map(|point| {
-            let e = green_strain(deformation_gradient(point, u));
-            let s = material.stress(e);
-            0.5 * point.area * (s[0] * e[0] + s[1] * e[1] + 2.0 * s[2] * e[2])
-        })
-        .sum()
-}
-
 /// Cauchy stress `[s11, s22, s12]` (MPa) at each integration point.
 pub fn cauchy_stress(points: &[GaussPoint; 4], material: &PlaneStrain, u: &[f64; 16]) -> [[f64; 3]; 4] {
     points.map(|point| {
@@ -284,6 +272,28 @@ mod tests {
         let mut force = [0.0; 16];
         add_tangent_and_force(points, &STEEL, u, &mut [0.0; PACKED], &mut force);
         force
+    }
+
+    /// Strain energy (N mm per mm of width) of the displacements `u`.
+    fn strain_energy(points: &[GaussPoint; 4], material: &PlaneStrain, u: &[f64; 16]) -> f64 {
+        points
+            .iter()
+            .map(|point| {
+                let e = green_strain(deformation_gradient(point, u));
+                let s = material.stress(e);
+                0.5 * point.area * (s[0] * e[0] + s[1] * e[1] + 2.0 * s[2] * e[2])
+            })
+            .sum()
+    }
+
+    #[test]
+    fn a_rigid_motion_stores_no_energy() {
+        let (points, x) = (gauss_points(&distorted()).unwrap(), distorted());
+        for (s, c) in [0.01_f64, 1.0, -2.5].map(f64::sin_cos) {
+            let moved = x.map(|[x, y]| [c * x - s * y - x + 0.7, s * x + c * y - y - 0.3]);
+            let energy = strain_energy(&points, &STEEL, &std::array::from_fn(|i| moved[i / 2][i % 2]));
+            assert!(energy < 1e-20 * 206_000.0, "turned by {s}, {c}: energy {energy}");
+        }
     }
 
     #[test]
