@@ -260,7 +260,7 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
                 // The peak of a single point is its pressure.
                 let energy = points
                     .iter()
-                    .filter_map(|p| Some((p.weight, flanks.evaluate((pair, at), law, &[*p])?.peak)))
+                    .filter_map(|p| Some((p.weight, flanks.evaluate((pair, at), law, &[*p])?.load / p.weight)))
                     .map(|(weight, pressure)| 0.5 * weight * pressure * pressure / law.stiffness)
                     .sum();
                 Flank { energy, force: all.force, torque: all.torque }

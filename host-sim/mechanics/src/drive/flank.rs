@@ -85,7 +85,7 @@ impl Involute {
     ///
     /// `r_b (H(rho) - theta)`, `H = half_base - roll + atan roll`, the two arc tangents taken as one of a small
     /// argument: `atan roll - theta = atan(middle) + atan z`.
-    #[inline]
+    #[inline(always)]
     fn distance(&self, p: [f64; 2]) -> (f64, f64) {
         let rho_squared = p[0] * p[0] + p[1] * p[1];
         let along = (rho_squared - self.base_radius * self.base_radius).max(1e-12).sqrt();
@@ -101,7 +101,7 @@ impl Involute {
     }
 
     /// Foot of a point on the flank of a space; nothing beyond the joint with the rounding.
-    #[inline]
+    #[inline(always)]
     fn foot_internal(&self, p: [f64; 2], junction_radius: f64) -> Option<Foot> {
         let (along, distance) = self.distance(p);
         let foot_along = along + distance;
@@ -245,7 +245,7 @@ impl ActiveFlank {
     }
 
     /// Foot of a point on the flank of a space (internal wheel), in the frame of that space.
-    #[inline]
+    #[inline(always)]
     pub fn foot_internal(&self, p: [f64; 2]) -> Foot {
         let on_flank = match &self.curve {
             FlankCurve::Involute(involute) => involute.foot_internal(p, self.junction_radius),
@@ -273,6 +273,7 @@ impl ActiveFlank {
         })
     }
 
+    #[inline(always)]
     fn foot_on_rounding(&self, p: [f64; 2]) -> Foot {
         let arm = [p[0] - self.rounding_centre[0], p[1] - self.rounding_centre[1]];
         let length = (arm[0] * arm[0] + arm[1] * arm[1]).sqrt().max(1e-12);

@@ -25,9 +25,6 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Where the ideal part stands.
-    pub(crate) const NOMINAL: Placement = Placement { turn: (0.0, 1.0), translation: [0.0; 2] };
-
     /// This placement seen in the mirror `y -> -y`, in which flanks of the minus side are looked at.
     #[inline]
     pub(crate) fn seen_from(self, side: Side) -> Placement {
@@ -156,7 +153,8 @@ mod tests {
     fn an_ideal_drive_stands_where_it_should() {
         let ideal = FlankDeviations::new(&Drive::hhd_95());
         assert!(ideal.teeth.len() == 188 && ideal.spaces.len() == 190 && ideal.largest == 0.0);
-        assert!(ideal.teeth.iter().chain(&ideal.spaces).all(|placement| *placement == Placement::NOMINAL));
+        let nominal = Placement { turn: (0.0, 1.0), translation: [0.0; 2] };
+        assert!(ideal.teeth.iter().chain(&ideal.spaces).all(|placement| *placement == nominal));
         assert!(ideal.tooth_depth.iter().chain(&ideal.space_depth).flatten().all(|depth| *depth == 0.0));
         assert_eq!(ideal.axis, [0.0; 2]);
     }

@@ -13,7 +13,7 @@ use crate::condense::{
     CellAt, CellPlacement, CellState, CellTangent, Chain, ChainBlock, CoRotation, CondensedWheel, DenseKernels,
     Geometric, Traction, Turn, back, one, one_mut, rotate_pairs, rotate_sides,
 };
-use crate::contact::{BorePressure, FlankPair, PairContribution};
+use crate::contact::{BorePressure, FlankPair};
 use crate::drive::Side;
 use crate::fem::Factor;
 use crate::fem::element::packed_index;
@@ -561,8 +561,8 @@ impl Wheels for CondensedWheels<'_> {
         self.bore.push((contact.edge, contact.stiffness));
     }
 
-    fn add_flank(&mut self, pair: FlankPair, contact: &PairContribution) {
-        self.flanks.push((pair, contact.stiffness.clone()));
+    fn add_flank(&mut self, pair: FlankPair, stiffness: Vec<f64>) {
+        self.flanks.push((pair, stiffness));
     }
 
     /// The bore corner of the first face of cell 0, along the bore.

@@ -52,8 +52,8 @@ impl NearPairs {
 
     /// Whether a pair that was taken for open bears in this state.
     pub fn missed(&self, flanks: &FlankContact, at: Configuration) -> bool {
-        let taken_for_open = self.pairs.iter().filter(|(_, near)| self.moved < near.open_until);
-        taken_for_open.map(|(pair, _)| flanks.smallest_gap(*pair, at)).any(|gap| gap < 0.0)
+        let mut taken_for_open = self.pairs.iter().filter(|(_, near)| self.moved < near.open_until);
+        taken_for_open.any(|(pair, _)| flanks.is_near(*pair, at, 0.0))
     }
 
     /// Takes no pair for open any more.
@@ -93,16 +93,15 @@ impl NearPairs {
         flanks: &FlankContact,
         at: Configuration,
         law: FlankLaw,
-        mut report: impl FnMut(FlankPair, &PairContribution),
+        mut report: impl FnMut(FlankPair, PairContribution),
     ) {
         for (&pair, near) in &mut self.pairs {
             if self.moved < near.open_until {
                 continue;
             }
-            let mut gap = f64::INFINITY;
-            match flanks.evaluate_with_gap((pair, at), law, &near.layout.points, &mut gap) {
-                Some(contact) => report(pair, &contact),
-                None => near.open_until = self.moved + gap,
+            match flanks.evaluate_with_gap((pair, at), law, &near.layout.points) {
+                (Some(contact), _) => report(pair, contact),
+                (None, gap) => near.open_until = self.moved + gap,
             }
         }
     }
@@ -124,10 +123,8 @@ impl NearPairs {
 
     /// Whether the corners of the spaces still face the places they were laid out for.
     pub(crate) fn layouts_fit(&self, flanks: &FlankContact, at: Configuration) -> bool {
-        let touching = self
-            .pairs
-            .iter()
-            .filter(|(pair, near)| self.moved >= near.open_until && flanks.smallest_gap(**pair, at) < TOUCH);
+        let touching =
+            self.pairs.iter().filter(|(pair, near)| self.moved >= near.open_until && flanks.is_near(**pair, at, TOUCH));
         touching.map(|(pair, near)| (near.layout.corner, flanks.corner(*pair, at))).all(|corners| match corners {
             (Some(a), Some(b)) => (a - b).abs() < CORNER_DRIFT,
             (None, None) => true,

@@ -537,7 +537,7 @@ impl<'p> Solver<'p> {
                     column[2 * node + k] += contact.border[i];
                 }
             }
-            wheels.add_flank(pair, contact);
+            wheels.add_flank(pair, contact.stiffness);
             corner += contact.corner;
             residual.flank_torque += contact.torque;
             residual.torque_scale += contact.torque.abs();

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::contact::{BorePressure, FlankPair, PairContribution};
+use crate::contact::{BorePressure, FlankPair};
 use crate::fem::element::{PACKED, add_tangent_and_force, linear_stiffness};
 use crate::fem::{Cholesky, Factor, PackedPositions, Pattern};
 use crate::mesh::rotate;
@@ -161,10 +161,10 @@ impl Wheels for SparseWheels<'_> {
         system.bore_positions[contact.edge].scatter(&contact.stiffness, &mut system.values);
     }
 
-    fn add_flank(&mut self, pair: FlankPair, contact: &PairContribution) {
+    fn add_flank(&mut self, pair: FlankPair, stiffness: Vec<f64>) {
         let system = self.system();
-        let n = contact.force.len();
-        let packed = (0..n).flat_map(|i| &contact.stiffness[i * n..=i * n + i]);
+        let n = stiffness.len().isqrt();
+        let packed = (0..n).flat_map(|i| &stiffness[i * n..=i * n + i]);
         system.pairs[&pair].scatter(packed, &mut system.values);
     }
 

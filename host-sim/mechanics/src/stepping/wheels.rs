@@ -1,6 +1,6 @@
 //! The two wheels as a solver sees them: forces of their deformation, and a factorised tangent.
 
-use crate::contact::{BorePressure, FlankPair, PairContribution};
+use crate::contact::{BorePressure, FlankPair};
 use crate::fem::Factor;
 
 use super::fast::Kept;
@@ -32,8 +32,8 @@ pub(super) trait Wheels: Factor {
     /// Adds the tangent of a bore edge.
     fn add_bore(&mut self, contact: &BorePressure);
 
-    /// Adds the tangent of a pair of flanks.
-    fn add_flank(&mut self, pair: FlankPair, contact: &PairContribution);
+    /// Adds the tangent of a pair of flanks (`PairContribution::stiffness`).
+    fn add_flank(&mut self, pair: FlankPair, stiffness: Vec<f64>);
 
     /// The direction held by [`super::newton::ANCHOR`] while the tangent is factorised: unknowns and weights.
     fn anchor(&self) -> Vec<(usize, f64)>;
