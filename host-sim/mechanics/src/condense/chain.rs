@@ -6,9 +6,9 @@
 //! unknowns the matrix is quasi-definite: their blocks are negative definite, those of the faces positive, and any
 //! order serves (Vanderbei 1995).
 
-use pulp::{Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
-use super::dense::{DenseKernels, kernel, one_mut, subtract_sides};
+use super::dense::{Backward, Eliminate, Forward, add, kernel};
 
 /// A block of unknowns.
 #[derive(Debug, Clone, Copy)]
@@ -38,13 +38,12 @@ struct Panel {
 /// Factor of a block matrix.
 #[derive(Debug, Clone, Default)]
 pub struct Chain {
-    kernels: DenseKernels,
+    arch: Arch,
     panels: Vec<Panel>,
     values: Vec<f64>,
-    /// First unknown of each block in a right-hand side.
+    /// First unknown of each block in a right-hand side, and the number of all.
     offsets: Vec<usize>,
-    unknowns: usize,
-    /// Work space: fronts that have been used up.
+    /// Work space: what was left of fronts, used up.
     spare: Vec<Vec<f64>>,
 }
 
@@ -62,10 +61,9 @@ impl Chain {
         self.panels.clear();
         self.values.clear();
         self.offsets.clear();
-        self.unknowns = 0;
+        self.offsets.push(0);
         for block in blocks {
-            self.offsets.push(self.unknowns);
-            self.unknowns += block.size;
+            self.offsets.push(self.unknowns() + block.size);
         }
         let mut order: Vec<u32> = (0..blocks.len() as u32).filter(|&b| blocks[b as usize].size > 0).collect();
         order.sort_by(|a, b| blocks[*a as usize].key.total_cmp(&blocks[*b as usize].key).then(a.cmp(b)));
@@ -98,12 +96,16 @@ impl Chain {
                 offset[*b as usize] = m;
                 m += blocks[*b as usize].size;
             }
-            let mut front = self.spare.pop().unwrap_or_default();
-            front.clear();
-            front.resize(m * m, 0.0);
+            let ChainBlock { size, sign, .. } = blocks[block as usize];
+            let start = self.values.len();
+            self.values.resize(start + m * size, 0.0);
+            let panel = &mut self.values[start..];
+            let mut rest = self.spare.pop().unwrap_or_default();
+            rest.clear();
+            rest.resize(m * (m - size), 0.0);
             let mut add = |of: &[u32], matrix: &[f64], before: usize| {
-                let add = AddBlocks { front: &mut front, m, of, matrix, before, blocks, offset: &offset };
-                self.kernels.0.dispatch(add);
+                let (panel, rest) = (&mut *panel, &mut rest[..]);
+                self.arch.dispatch(AddBlocks { panel, rest, m, of, matrix, before, blocks, offset: &offset });
             };
             if !sources.iter().all(|(_, c)| matrix_of(*c, &mut |matrix| add(&contributions[*c], matrix, 0))) {
                 return false;
@@ -112,16 +114,13 @@ impl Chain {
                 let Panel { later, size, .. } = &self.panels[*panel];
                 add(later, matrix, *size);
             }
-            let ChainBlock { size, sign, .. } = blocks[block as usize];
-            if !self.kernels.eliminate(&mut front, m, size, sign) {
+            if !self.arch.dispatch(Eliminate { panel, rest: &mut rest, m, sign }) {
                 return false;
             }
-            let start = self.values.len();
-            self.values.extend_from_slice(&front[..m * size]);
             self.spare.extend(updates_here.into_iter().map(|(_, matrix)| matrix));
             members.remove(0);
             if !members.is_empty() {
-                updates.push((self.panels.len(), front));
+                updates.push((self.panels.len(), rest));
             }
             self.panels.push(Panel { block, size, sign, order: m, later: members, start });
         }
@@ -130,7 +129,7 @@ impl Chain {
 
     /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
-        self.unknowns
+        self.offsets.last().copied().unwrap_or(0)
     }
 
     /// First unknown of each block in a right-hand side.
@@ -140,15 +139,14 @@ impl Chain {
 
     /// Solves in place for W right-hand sides.
     pub fn solve<const W: usize>(&self, x: &mut [[f64; W]]) {
-        assert_eq!(x.len(), self.unknowns);
-        let end = |block: u32| self.offsets.get(block as usize + 1).copied().unwrap_or(self.unknowns);
-        let range = |block: u32| self.offsets[block as usize]..end(block);
+        assert_eq!(x.len(), self.unknowns());
+        let range = |block: u32| self.offsets[block as usize]..self.offsets[block as usize + 1];
         let mut later = Vec::new();
         for panel in &self.panels {
             later.clear();
             later.resize(panel.order - panel.size, [0.0; W]);
-            let shape = [panel.order, panel.size];
-            self.kernels.forward(self.values(panel), shape, panel.sign, &mut x[range(panel.block)], &mut later);
+            let (values, own) = (&self.values[panel.start..], &mut x[range(panel.block)]);
+            self.arch.dispatch(Forward { panel: values, sign: panel.sign, x: own, rest: &mut later });
             let to = panel.later.iter().flat_map(|b| range(*b));
             for (at, gained) in to.zip(&later) {
                 x[at].iter_mut().zip(gained).for_each(|(x, g)| *x += g);
@@ -157,44 +155,47 @@ impl Chain {
         for panel in self.panels.iter().rev() {
             later.clear();
             panel.later.iter().for_each(|b| later.extend_from_slice(&x[range(*b)]));
-            let shape = [panel.order, panel.size];
-            self.kernels.backward(self.values(panel), shape, panel.sign, &mut x[range(panel.block)], &later);
+            let (values, own) = (&self.values[panel.start..], &mut x[range(panel.block)]);
+            self.arch.dispatch(Backward { panel: values, sign: panel.sign, x: own, rest: &later });
         }
-    }
-
-    fn values(&self, panel: &Panel) -> &[f64] {
-        &self.values[panel.start..panel.start + panel.order * panel.size]
     }
 }
 
-// Adds the lower triangle of a matrix over blocks, `before` rows and columns of it left out, to that of a front.
+// Adds the lower triangle of a matrix over blocks to that of a front, `before` values of each column left out.
 kernel!(AddBlocks {
-    front: &'a mut [f64], m: usize, of: &'a [u32], matrix: &'a [f64], before: usize, blocks: &'a [ChainBlock],
-    offset: &'a [usize]
-} -> (), |_simd| {
+    panel: &'a mut [f64], rest: &'a mut [f64], m: usize, of: &'a [u32], matrix: &'a [f64], before: usize,
+    blocks: &'a [ChainBlock], offset: &'a [usize]
+} -> (), |simd| {
     let stride = before + of.iter().map(|b| blocks[*b as usize].size).sum::<usize>();
-    let mut column = before;
+    let mut columns = matrix.chunks_exact(stride);
+    let mut diagonal = before;
     for (jb, &b) in of.iter().enumerate() {
         let (to, size) = (offset[b as usize], blocks[b as usize].size);
-        for j in 0..size {
-            let values = &matrix[(column + j) * stride..];
-            let own = &mut front[(to + j) * (m + 1)..][..size - j];
-            subtract_sides(one_mut(own), &values[column + j..][..size - j], [-1.0]);
-            let mut row = column + size;
+        for (j, values) in columns.by_ref().take(size).enumerate() {
+            let own = &mut column(panel, rest, m, to + j)[to + j..to + size];
+            add(simd, own, &values[diagonal + j..diagonal + size]);
+            let mut row = diagonal + size;
             for &a in &of[jb + 1..] {
                 let (from, size) = (offset[a as usize], blocks[a as usize].size);
                 let values = &values[row..row + size];
                 if from > to {
-                    subtract_sides(one_mut(&mut front[from + (to + j) * m..][..size]), values, [-1.0]);
+                    add(simd, &mut column(panel, rest, m, to + j)[from..from + size], values);
                 } else {
-                    values.iter().enumerate().for_each(|(i, x)| front[to + j + (from + i) * m] += x);
+                    values.iter().enumerate().for_each(|(i, x)| column(panel, rest, m, from + i)[to + j] += x);
                 }
                 row += size;
             }
         }
-        column += size;
+        diagonal += size;
     }
 });
+
+/// Column k of a front, of which the panel has the first ones.
+#[inline(always)]
+fn column<'a>(panel: &'a mut [f64], rest: &'a mut [f64], m: usize, k: usize) -> &'a mut [f64] {
+    let start = k * m;
+    if start < panel.len() { &mut panel[start..start + m] } else { &mut rest[start - panel.len()..][..m] }
+}
 
 #[cfg(test)]
 mod tests {

@@ -136,8 +136,9 @@ mod tests {
     use crate::fem::material::PlaneStrain;
     use crate::mesh::{MeshLevel, WheelMesh};
 
-    use super::super::dense::{DenseKernels, one, one_mut};
+    use super::super::dense::{Multiply, one, one_mut};
     use super::super::model::{Cell, CondensedWheel};
+    use pulp::Arch;
 
     fn flexspline() -> CondensedWheel {
         let mesh = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Coarse).unwrap();
@@ -149,7 +150,7 @@ mod tests {
         let mut state = CellState::default();
         cell.frame.split(d, &mut state);
         let mut force = vec![0.0; d.len()];
-        DenseKernels::default().multiply_add(&cell.stiffness, one(&state.q), 1.0, one_mut(&mut force));
+        Arch::new().dispatch(Multiply { a: &cell.stiffness, x: one(&state.q), sign: 1.0, y: one_mut(&mut force) });
         let energy = 0.5 * force.iter().zip(&state.q).map(|(f, q)| f * q).sum::<f64>();
         cell.frame.balance(&state, &mut force);
         for f in force.chunks_exact_mut(2) {
@@ -228,13 +229,13 @@ mod tests {
         let (cell, _) = wheel.cell(0, true);
         let d = deformed(cell);
         let n = d.len();
-        let kernels = DenseKernels::default();
+        let arch = Arch::new();
         let (_, _, state) = energy_and_force(cell, &d);
         let mut force = vec![0.0; n];
-        kernels.multiply_add(&cell.stiffness, one(&state.q), 1.0, one_mut(&mut force));
+        arch.dispatch(Multiply { a: &cell.stiffness, x: one(&state.q), sign: 1.0, y: one_mut(&mut force) });
         let quarter: Vec<f64> = state.q.chunks(2).flat_map(|q| [-q[1], q[0]]).collect();
         let mut turned = vec![0.0; n];
-        kernels.multiply_add(&cell.stiffness, one(&quarter), 1.0, one_mut(&mut turned));
+        arch.dispatch(Multiply { a: &cell.stiffness, x: one(&quarter), sign: 1.0, y: one_mut(&mut turned) });
         let (g, c) = cell.frame.geometric(&state, &force, &turned);
         let mut a = vec![0.0; n - state.turn_rate.len()];
         a.extend(&state.turn_rate);

@@ -16,6 +16,10 @@ mod tangent;
 
 pub use chain::{Chain, ChainBlock};
 pub use corotation::{CellState, CoRotation};
-pub use dense::{DenseKernels, one, one_mut};
+pub(crate) use dense::{Multiply, kernel};
+pub use dense::{one, one_mut};
 pub use model::{Cell, CondensedWheel};
-pub use tangent::{CellAt, CellPlacement, CellTangent, Geometric, Traction, Turn, back, rotate_pairs, rotate_sides};
+pub(crate) use tangent::Reduce;
+pub use tangent::{
+    CellAt, CellPlacement, CellTangent, Sides, Traction, Turn, back, put, rotate_pairs, rotate_sides, take,
+};

@@ -1,13 +1,14 @@
 //! Both wheels of a drive, condensed.
 
 use flexspline_algebra::{MatRef, cholesky, product};
+use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::fem::material::PlaneStrain;
 use crate::mesh::WheelMesh;
 
 use super::corotation::CoRotation;
-use super::dense::{DenseKernels, one, one_mut};
+use super::dense::{Eliminate, Multiply, MultiplyTransposed, one, one_mut};
 use super::skin::Skin;
 use super::superelement::Superelement;
 
@@ -28,7 +29,7 @@ pub struct Cell {
     pub flank_coupling: Vec<f64>,
     /// Stiffness of the other nodes while no force acts on the flanks, r x r.
     pub body: Vec<f64>,
-    /// Stiffness with the bore nodes eliminated, nothing touching them (see `DenseKernels::eliminate`).
+    /// Stiffness with the bore nodes eliminated, nothing touching them (see `Eliminate`).
     pub free_body: Vec<f64>,
 }
 
@@ -44,7 +45,8 @@ impl Cell {
         let columns = |m: MatRef<'_>| -> Vec<f64> { m.col_iter().flat_map(|c| c.iter().copied()).collect() };
         let body = columns(body.as_ref());
         let mut free_body = body.clone();
-        assert!(DenseKernels::default().eliminate(&mut free_body, r, b, 1.0), "a cell held at its faces is stiff");
+        let (panel, rest) = free_body.split_at_mut(r * b);
+        assert!(Arch::new().dispatch(Eliminate { panel, rest, m: r, sign: 1.0 }), "a cell held at its faces is stiff");
         Cell {
             unknowns: element.unknowns,
             frame: CoRotation::new(&element.position, (f + b) / 2),
@@ -62,7 +64,8 @@ impl Cell {
         let [f, b, face] = self.unknowns;
         let mut seat = self.seat[f..].to_vec();
         let flanks = one(&self.seat[..f]);
-        DenseKernels::default().multiply_transposed_add(&self.flank_coupling, flanks, -1.0, one_mut(&mut seat));
+        let y = one_mut(&mut seat);
+        Arch::new().dispatch(MultiplyTransposed { a: &self.flank_coupling, x: flanks, sign: -1.0, y });
         Cell {
             unknowns: [0, b, face],
             frame: self.frame.without(f / 2),
@@ -92,12 +95,12 @@ impl Cell {
 
     /// Displacements of the flank nodes that no force acts on, from those of the other nodes and of the seat, in the
     /// frame.
-    pub(crate) fn free_flanks(&self, kernels: DenseKernels, body: &[f64], seat_mm: f64) -> Vec<f64> {
+    pub(crate) fn free_flanks(&self, arch: Arch, body: &[f64], seat_mm: f64) -> Vec<f64> {
         let mut flanks = vec![0.0; self.flank()];
-        kernels.multiply_add(&self.flank_coupling, one(body), -1.0, one_mut(&mut flanks));
+        arch.dispatch(Multiply { a: &self.flank_coupling, x: one(body), sign: -1.0, y: one_mut(&mut flanks) });
         if seat_mm != 0.0 {
             let seat = one(&self.seat[..self.flank()]);
-            kernels.multiply_add(&self.flank_flexibility, seat, -seat_mm, one_mut(&mut flanks));
+            arch.dispatch(Multiply { a: &self.flank_flexibility, x: seat, sign: -seat_mm, y: one_mut(&mut flanks) });
         }
         flanks
     }
@@ -233,7 +236,7 @@ mod tests {
                 u[2 * node..2 * node + 2].copy_from_slice(x);
             }
             let mut f: Vec<f64> = cell.seat.iter().map(|s| s * seat_mm).collect();
-            DenseKernels::default().multiply_add(&cell.stiffness, one(&q), 1.0, one_mut(&mut f));
+            Arch::new().dispatch(Multiply { a: &cell.stiffness, x: one(&q), sign: 1.0, y: one_mut(&mut f) });
             super::super::tangent::rotate_pairs(&mut f, angle(j).sin_cos());
             unknowns.iter().zip(&f).for_each(|(k, f)| expected[*k as usize] += f);
         }
@@ -278,14 +281,14 @@ mod tests {
         let mesh = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Coarse).unwrap();
         let wheel = CondensedWheel::new(&mesh, &steel(), 0, |_| false);
         let ((bare, _), (whole, _)) = (wheel.cell(0, false), wheel.cell(0, true));
-        let kernels = DenseKernels::default();
+        let arch = Arch::new();
         let body: Vec<f64> = (0..whole.bore() + 2 * whole.face()).map(|k| (k as f64).sin()).collect();
-        let all: Vec<f64> = whole.free_flanks(kernels, &body, 0.0).into_iter().chain(body.iter().copied()).collect();
+        let all: Vec<f64> = whole.free_flanks(arch, &body, 0.0).into_iter().chain(body.iter().copied()).collect();
         let mut force = vec![0.0; all.len()];
-        kernels.multiply_add(&whole.stiffness, one(&all), 1.0, one_mut(&mut force));
+        arch.dispatch(Multiply { a: &whole.stiffness, x: one(&all), sign: 1.0, y: one_mut(&mut force) });
         let mut expected = vec![0.0; whole.flank()];
         let mut on_body = vec![0.0; body.len()];
-        kernels.multiply_add(&bare.stiffness, one(&body), 1.0, one_mut(&mut on_body));
+        arch.dispatch(Multiply { a: &bare.stiffness, x: one(&body), sign: 1.0, y: one_mut(&mut on_body) });
         expected.extend(on_body);
         let scale = expected.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
         assert!(force.iter().zip(&expected).all(|(f, e)| (f - e).abs() < 1e-9 * scale));

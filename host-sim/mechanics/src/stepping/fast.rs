@@ -7,11 +7,12 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::Range;
 use std::rc::Rc;
 
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::condense::{
-    CellAt, CellPlacement, CellState, CellTangent, Chain, ChainBlock, CoRotation, CondensedWheel, DenseKernels,
-    Geometric, Traction, Turn, back, one, one_mut, rotate_pairs, rotate_sides,
+    CellAt, CellPlacement, CellState, CellTangent, Chain, ChainBlock, CoRotation, CondensedWheel, Multiply, Reduce,
+    Sides, Traction, Turn, back, kernel, one, one_mut, put, rotate_pairs, rotate_sides, take,
 };
 use crate::contact::{BorePressure, FlankPair};
 use crate::drive::Side;
@@ -39,7 +40,7 @@ pub struct CondensedDrive {
 
 /// A face between two cells: its block, its unknowns, and its frame.
 #[derive(Debug, Clone)]
-struct CellFace {
+pub(crate) struct CellFace {
     block: usize,
     unknowns: Range<usize>,
     turn: Turn,
@@ -178,14 +179,16 @@ pub(super) type Kept = Rc<Factorisation>;
 pub(super) struct CondensedWheels<'p> {
     problem: &'p Problem,
     model: &'p CondensedDrive,
-    kernels: DenseKernels,
+    arch: Arch,
     /// Cells with a flank that touches or may soon; the flank nodes of the others follow when all is done.
     live: Vec<bool>,
     /// Those whose flank nodes took part in the last solution.
     solved: Vec<bool>,
-    /// The flexspline cells of this state, and their forces before balancing.
+    /// The flexspline cells of this state, their forces before balancing, and those of their displacements turned by a
+    /// quarter, for the tangent.
     states: Vec<CellState>,
     forces: Vec<Vec<f64>>,
+    quarter_forces: Vec<Vec<f64>>,
     /// Where the wave and the output stand.
     generator_rad: f64,
     output_rad: f64,
@@ -209,11 +212,12 @@ impl<'p> CondensedWheels<'p> {
         CondensedWheels {
             problem,
             model,
-            kernels: DenseKernels::default(),
+            arch: Arch::new(),
             live: vec![false; cells],
             solved: vec![false; cells],
             states: vec![CellState::default(); teeth],
             forces: vec![Vec::new(); teeth],
+            quarter_forces: vec![Vec::new(); teeth],
             generator_rad: 0.0,
             output_rad: 0.0,
             bore: Vec::new(),
@@ -261,6 +265,28 @@ impl<'p> CondensedWheels<'p> {
         [cell as u32, next as u32]
     }
 
+    /// Forces of each flexspline cell by its displacements, turned by a quarter or not: of cells that are alike, four
+    /// together.
+    fn cell_forces(&self, quarter: bool, mut forces: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let cell = |j: usize| self.model.flexspline.cell(j, self.live[j]).0;
+        let all: Vec<usize> = (0..forces.len()).collect();
+        for group in all.chunk_by(|i, j| std::ptr::eq(cell(*i), cell(*j))).flat_map(|alike| alike.chunks(4)) {
+            let mut sides = vec![[0.0; 4]; self.states[group[0]].q.len()];
+            let mut products = sides.clone();
+            for (w, j) in group.iter().enumerate() {
+                for ([x, y], q) in sides.as_chunks_mut().0.iter_mut().zip(self.states[*j].q.as_chunks::<2>().0) {
+                    (x[w], y[w]) = if quarter { (-q[1], q[0]) } else { (q[0], q[1]) };
+                }
+            }
+            self.arch.dispatch(Multiply { a: &cell(group[0]).stiffness, x: &sides, sign: 1.0, y: &mut products });
+            for (w, j) in group.iter().enumerate() {
+                forces[*j].clear();
+                forces[*j].extend(products.iter().map(|product| product[w]));
+            }
+        }
+        forces
+    }
+
     /// Reduces a flexspline cell.
     fn reduce_flexspline_cell(
         &self,
@@ -268,27 +294,25 @@ impl<'p> CondensedWheels<'p> {
         tangent: &mut CellTangent,
         tractions: Vec<Traction>,
         matrix: &mut Vec<f64>,
-        front: &mut Vec<f64>,
+        rest: &mut Vec<f64>,
     ) -> bool {
         let mesh = self.model.fs_mesh();
         let (cell, _) = self.model.flexspline.cell(j, self.live[j]);
         let state = &self.states[j];
-        let quarter: Vec<f64> = state.q.chunks_exact(2).flat_map(|q| [-q[1], q[0]]).collect();
-        let mut turned = vec![0.0; quarter.len()];
-        self.kernels.multiply_add(&cell.stiffness, one(&quarter), 1.0, one_mut(&mut turned));
-        let (g, c) = cell.frame.geometric(state, &self.forces[j], &turned);
+        let (g, c) = cell.frame.geometric(state, &self.forces[j], &self.quarter_forces[j]);
         let place = CellPlacement {
             frame: (mesh.sector_angle(j) + state.turn).sin_cos(),
             faces: [0.5, -0.5].map(|half| (state.turn + half * mesh.pitch()).sin_cos()),
             blocks: self.faces(j),
         };
-        let geometric = Geometric { a: &state.turn_rate, g: &g, c };
-        let touched = self.touched_body(j, front).then_some(front.as_mut_slice());
-        tangent.reduce(self.kernels, cell, (place, tractions), Some(geometric), touched, matrix)
+        let geometric = Some((&state.turn_rate[..], g, c));
+        self.touched_body(j, &mut tangent.panel, rest);
+        self.arch.dispatch(Reduce { tangent, cell, place, tractions, geometric, touched: rest, matrix })
     }
 
-    /// The matrix of bore and face nodes of a cell with the contact on its bore, if there is any.
-    fn touched_body(&self, j: usize, matrix: &mut Vec<f64>) -> bool {
+    /// The matrix of bore and face nodes of a cell with the contact on its bore, columns of the bore (the `panel`) and
+    /// the others; nothing where nothing touches it.
+    fn touched_body(&self, j: usize, panel: &mut Vec<f64>, rest: &mut Vec<f64>) {
         let mesh = self.model.fs_mesh();
         let (cell, _) = self.model.flexspline.cell(j, false);
         let [b, face, order] = [cell.bore(), cell.face(), cell.bore() + 2 * cell.face()];
@@ -296,10 +320,12 @@ impl<'p> CondensedWheels<'p> {
         let (sin, cos) = (mesh.sector_angle(j) + self.states[j].turn).sin_cos();
         let first = self.bore.partition_point(|(edge, _)| *edge < j * per_cell);
         let touching = self.bore[first..].iter().take_while(|(edge, _)| *edge < (j + 1) * per_cell);
-        let mut any = false;
+        panel.clear();
         for (edge, k) in touching {
-            if !std::mem::replace(&mut any, true) {
-                matrix.clone_from(&cell.body);
+            if panel.is_empty() {
+                panel.extend_from_slice(&cell.body[..b * order]);
+                rest.clear();
+                rest.extend_from_slice(&cell.body[b * order..]);
             }
             // Nodes along the bore of the cell: corner of the first face, bore nodes, corner of the second face.
             let place = |n: usize| match n {
@@ -323,14 +349,14 @@ impl<'p> CondensedWheels<'p> {
                         let values = [cos * rows[0][x] + sin * rows[1][x], cos * rows[1][x] - sin * rows[0][x]];
                         for y in 0..2 {
                             if row + x >= column + y {
-                                matrix[row + x + (column + y) * order] += values[y];
+                                let to = row + x + (column + y) * order;
+                                if column < b { panel[to] += values[y] } else { rest[to - b * order] += values[y] }
                             }
                         }
                     }
                 }
             }
         }
-        any
     }
 
     fn reduce_circular_spline_cell(
@@ -347,7 +373,7 @@ impl<'p> CondensedWheels<'p> {
             blocks: self.faces(first + t),
         };
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
-        tangent.reduce(self.kernels, cell, (place, tractions), None, None, matrix)
+        self.arch.dispatch(Reduce { tangent, cell, place, tractions, geometric: None, touched: &mut [], matrix })
     }
 
     /// Places the flank nodes of these cells where they stand while no force acts on them.
@@ -357,7 +383,7 @@ impl<'p> CondensedWheels<'p> {
         for j in (0..fs.count()).filter(|j| of(*j)) {
             self.model.flexspline_cell(j, false, &state.u, &mut d, &mut inner);
             let (cell, all) = fs.cell(j, true);
-            let q = cell.free_flanks(self.kernels, &inner.q, 0.0);
+            let q = cell.free_flanks(self.arch, &inner.q, 0.0);
             let mut flanks = CoRotation::join(&inner, cell.frame.positions(), &q);
             rotate_pairs(&mut flanks, self.model.frames[0][j]);
             all.iter().zip(&flanks).for_each(|(u, x)| state.u[*u as usize] = *x);
@@ -365,7 +391,7 @@ impl<'p> CondensedWheels<'p> {
         for t in (0..cs.count()).filter(|t| of(fs.count() + t)) {
             self.model.circular_spline_cell(t, false, &state.v, &mut d);
             let (cell, all) = cs.cell(t, true);
-            let mut flanks = cell.free_flanks(self.kernels, &d, self.problem.seat_displacement);
+            let mut flanks = cell.free_flanks(self.arch, &d, self.problem.seat_displacement);
             rotate_pairs(&mut flanks, self.model.frames[1][t]);
             all.iter().zip(&flanks).for_each(|(u, x)| state.v[*u as usize - cs.first_unknown] = *x);
         }
@@ -430,31 +456,19 @@ fn low_rank(stiffness: &[f64]) -> (usize, Vec<f64>) {
 impl Factor for CondensedWheels<'_> {
     fn solve(&mut self, columns: &mut [f64], count: usize) {
         match count {
-            1 => self.solve_sides(one_mut(columns)),
-            2..=4 => self.solve_beside::<4>(columns),
-            _ => self.solve_beside::<8>(columns),
+            1 => self.solve_sides::<1>(columns),
+            2..=4 => self.solve_sides::<4>(columns),
+            _ => self.solve_sides::<8>(columns),
         }
     }
 }
 
 impl CondensedWheels<'_> {
     /// Solves in place for at most W right-hand sides, which lie one after the other in `columns`.
-    fn solve_beside<const W: usize>(&mut self, columns: &mut [f64]) {
-        let n = self.unknowns();
-        let mut x = vec![[0.0; W]; n];
-        for (w, column) in columns.chunks_exact(n).enumerate() {
-            x.iter_mut().zip(column).for_each(|(x, value)| x[w] = *value);
-        }
-        self.solve_sides(&mut x);
-        for (w, column) in columns.chunks_exact_mut(n).enumerate() {
-            x.iter().zip(column).for_each(|(x, value)| *value = x[w]);
-        }
-    }
-
-    /// Solves in place for W right-hand sides that lie beside one another.
-    fn solve_sides<const W: usize>(&mut self, x: &mut [[f64; W]]) {
+    fn solve_sides<const W: usize>(&mut self, columns: &mut [f64]) {
         self.solved.clone_from(&self.live);
-        let CondensedWheels { model, kernels, factor, live, turned, kept, .. } = self;
+        let unknowns = self.unknowns();
+        let CondensedWheels { model, arch, factor, live, turned, kept, .. } = self;
         let factor = factor.as_ref();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
         // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
@@ -463,39 +477,53 @@ impl CondensedWheels<'_> {
         let cells: Vec<CellAt> = (0..fs.count())
             .map(|j| fs.cell(j, factor.live[j] || now(fs_live, j)))
             .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
-            .map(|(cell, unknowns)| CellAt { kernels: *kernels, cell, unknowns, order: &factor.chain })
+            .zip(&factor.cells)
+            .map(|((cell, unknowns), tangent)| CellAt { tangent, cell, unknowns, order: &factor.chain })
+            // A cell with neither flank nor bore has nothing to give and to take.
+            .filter(|at| at.cell.flank() + at.cell.bore() > 0)
             .collect();
-        let mut chain = vec![[0.0; W]; factor.chain.unknowns()];
-        let each: usize = cells.iter().map(CellAt::kept).sum();
+        let most = cells.iter().map(|at| at.kept()[1]).max().unwrap_or(0);
+        let each = cells.iter().map(|at| at.kept()[0]).sum::<usize>() + most;
         kept.resize(kept.len().max(W * each), 0.0);
-        let mut left = &mut kept.as_chunks_mut().0[..];
-        for (at, tangent) in cells.iter().zip(&factor.cells) {
-            let (own, others) = left.split_at_mut(at.kept());
-            tangent.forward(*at, x, &mut chain, own);
-            left = others;
-        }
-        for face in &model.faces {
-            let own = &mut x[face.unknowns.clone()];
-            rotate_sides(own, back(face.turn));
-            let to = &mut chain[factor.chain.offset(face.block)..];
-            for (to, own) in to.iter_mut().zip(own) {
-                to.iter_mut().zip(own).for_each(|(to, x)| *to += *x);
-            }
-        }
-        factor.chain.solve(&mut chain);
-        let mut left = &mut kept.as_chunks_mut().0[..];
-        for (at, tangent) in cells.iter().zip(&factor.cells) {
-            let (own, others) = left.split_at_mut(at.kept());
-            tangent.backward(*at, x, &chain, own);
-            left = others;
-        }
-        for face in &model.faces {
-            let own = &mut x[face.unknowns.clone()];
-            own.copy_from_slice(&chain[factor.chain.offset(face.block)..][..own.len()]);
-            rotate_sides(own, face.turn);
-        }
+        let (mut sides, kept): (Vec<_>, _) =
+            (columns.chunks_exact_mut(unknowns).collect(), kept.as_chunks_mut::<W>().0);
+        arch.dispatch(Solve { order: &factor.chain, cells: &cells, faces: &model.faces, sides: &mut sides, kept });
     }
 }
+
+// Solves for W right-hand sides, which lie beside one another in `kept`.
+kernel!(Solve<W> {
+    order: &'a Chain, cells: &'a [CellAt<'a>], faces: &'a [CellFace], sides: &'a mut Sides<'a>,
+    kept: &'a mut [[f64; W]]
+} -> (), |simd| {
+    let mut chain = vec![[0.0; W]; order.unknowns()];
+    let mut start = 0;
+    for at in cells {
+        at.forward(simd, sides, &mut chain, &mut kept[start..]);
+        start += at.kept()[0];
+    }
+    let mut own = Vec::new();
+    for face in faces {
+        own.resize(face.unknowns.len(), [0.0; W]);
+        take(sides, face.unknowns.clone(), &mut own);
+        rotate_sides(&mut own, back(face.turn));
+        for (to, own) in chain[order.offset(face.block)..].iter_mut().zip(&own) {
+            to.iter_mut().zip(own).for_each(|(to, x)| *to += *x);
+        }
+    }
+    order.solve(&mut chain);
+    // What a cell uses up lies where the next one kept something, which is done by then.
+    for at in cells.iter().rev() {
+        start -= at.kept()[0];
+        at.backward(simd, sides, &chain, &mut kept[start..]);
+    }
+    for face in faces {
+        own.clear();
+        own.extend_from_slice(&chain[order.offset(face.block)..][..face.unknowns.len()]);
+        rotate_sides(&mut own, face.turn);
+        put(sides, face.unknowns.clone(), &own);
+    }
+});
 
 impl Wheels for CondensedWheels<'_> {
     fn unknowns(&self) -> usize {
@@ -527,14 +555,14 @@ impl Wheels for CondensedWheels<'_> {
         self.output_rad = state.output_rad;
         let fs = &self.model.flexspline;
         let mut d = Vec::new();
-        for j in 0..fs.count() {
-            let (cell, unknowns) = fs.cell(j, self.live[j]);
-            let (inner, f) = (&mut self.states[j], &mut self.forces[j]);
+        for (j, inner) in self.states.iter_mut().enumerate() {
             self.model.flexspline_cell(j, self.live[j], &state.u, &mut d, inner);
-            f.clear();
-            f.resize(d.len(), 0.0);
-            self.kernels.multiply_add(&cell.stiffness, one(&inner.q), 1.0, one_mut(f));
-            d.copy_from_slice(f);
+        }
+        let forces = std::mem::take(&mut self.forces);
+        self.forces = self.cell_forces(false, forces);
+        for (j, inner) in self.states.iter().enumerate() {
+            let (cell, unknowns) = fs.cell(j, self.live[j]);
+            d.clone_from(&self.forces[j]);
             cell.frame.balance(inner, &mut d);
             rotate_pairs(&mut d, (fs.skin.mesh.sector_angle(j) + inner.turn).sin_cos());
             for (u, f) in unknowns.iter().zip(&d) {
@@ -549,7 +577,7 @@ impl Wheels for CondensedWheels<'_> {
             self.model.circular_spline_cell(t, live, &state.v, &mut d);
             f.clear();
             f.extend(cell.seat.iter().map(|s| s * self.problem.seat_displacement));
-            self.kernels.multiply_add(&cell.stiffness, one(&d), 1.0, one_mut(&mut f));
+            self.arch.dispatch(Multiply { a: &cell.stiffness, x: one(&d), sign: 1.0, y: one_mut(&mut f) });
             rotate_pairs(&mut f, self.model.frames[1][t]);
             for (u, f) in unknowns.iter().zip(&f) {
                 force[*u as usize] -= f;
@@ -572,6 +600,8 @@ impl Wheels for CondensedWheels<'_> {
     }
 
     fn factorise(&mut self, spring: f64) -> bool {
+        let forces = std::mem::take(&mut self.quarter_forces);
+        self.quarter_forces = self.cell_forces(true, forces);
         let (mut tractions, ranks) = self.tractions();
         let blocks = self.blocks(&ranks);
         let mut factor = Rc::try_unwrap(std::mem::take(&mut self.factor)).unwrap_or_default();
@@ -586,7 +616,7 @@ impl Wheels for CondensedWheels<'_> {
         let diagonal = |block: &ChainBlock| if block.sign < 0.0 { -1.0 } else { spring };
         let stiffened = blocks.iter().enumerate().filter(|(k, block)| diagonal(block) != 0.0 || *k == 0);
         contributions.extend(stiffened.map(|(k, _)| vec![k as u32]));
-        let (mut matrices, mut front) = (std::mem::take(&mut self.contributions), Vec::new());
+        let (mut matrices, mut rest) = (std::mem::take(&mut self.contributions), Vec::new());
         let fs_cells = self.model.flexspline.count();
         matrices.resize_with(1 + live.len() - fs_cells, Vec::new);
         let definite = chain.factorise(&blocks, &contributions, |c, add| {
@@ -605,7 +635,7 @@ impl Wheels for CondensedWheels<'_> {
             // Cells of the flexspline share a matrix, those of the circular spline may have theirs from last time.
             let matrix = &mut matrices[(c + 1).saturating_sub(fs_cells)];
             let definite = if c < fs_cells {
-                self.reduce_flexspline_cell(c, tangent, tractions, matrix, &mut front)
+                self.reduce_flexspline_cell(c, tangent, tractions, matrix, &mut rest)
             } else {
                 self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions, matrix)
             };
