@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use crate::contact::{AlongFace, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
-use crate::fem::{Border, BorderedSystem, dot, largest};
+use crate::fem::{Border, BorderedSystem, largest};
 use crate::mesh::rotate;
 
 use super::continuation::{
@@ -570,10 +570,8 @@ impl<'p> Solver<'p> {
         let corner = &mut self.border.corner;
         corner[OUTPUT * width + OUTPUT] += if residual.free_output { HOLDS_A_FREE_OUTPUT } else { drag_stiffness };
 
-        for (f, w) in residual.force.iter_mut().zip(&problem.rotation_weights) {
-            *f -= state.sleeve_moment * w;
-        }
-        let rotation = dot(&problem.rotation_weights, &state.u);
+        problem.rotation_weights.iter().for_each(|(k, w)| residual.force[*k] -= state.sleeve_moment * w);
+        let rotation = problem.rotation_weights.iter().map(|(k, w)| w * state.u[*k]).sum::<f64>();
         residual.border[SLEEVE] = -(rotation - problem.sleeve_compliance * state.sleeve_moment);
         corner[SLEEVE * width + SLEEVE] = -problem.sleeve_compliance;
         corner[ANCHORED * width + ANCHORED] = 1.0 / ANCHOR;
@@ -813,7 +811,7 @@ impl Leaning {
 fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
     let width = problem.first_amplitude().unwrap_or(problem.first_wave()) + problem.waves.len();
     let mut border = Border::zeros(wheels.unknowns(), width);
-    border.column_mut(SLEEVE)[..problem.rotation_weights.len()].copy_from_slice(&problem.rotation_weights);
+    problem.rotation_weights.iter().for_each(|(k, w)| border.column_mut(SLEEVE)[*k] = *w);
     for (unknown, weight) in wheels.anchor() {
         border.column_mut(ANCHORED)[unknown] = weight;
     }

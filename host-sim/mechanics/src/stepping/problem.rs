@@ -149,8 +149,8 @@ pub struct Problem {
     tooth: ActiveFlank,
     space: ActiveFlank,
     deviations: FlankDeviations,
-    /// Weights of the mean rotation of the bore: rotation = rotation_weights . u.
-    pub(super) rotation_weights: Vec<f64>,
+    /// Weights of the mean rotation of the bore by unknown of the flexspline: rotation = rotation_weights . u.
+    pub(super) rotation_weights: Vec<(usize, f64)>,
     /// Weights of the mean displacement of the bore in x; that in y follows by symmetry of the nodes.
     pub(super) mean_weights: Vec<f64>,
     /// 1 / torsional stiffness of the sleeve per mm of width (rad mm / N mm); zero when rigid.
@@ -483,7 +483,7 @@ impl Problem {
 }
 
 /// Linear functionals of the bore displacement: rotation of what is held, and mean x displacement.
-fn bore_averages(mesh: &WheelMesh, bore: &BoreContact, holding: Holding) -> (Vec<f64>, Vec<f64>) {
+fn bore_averages(mesh: &WheelMesh, bore: &BoreContact, holding: Holding) -> (Vec<(usize, f64)>, Vec<f64>) {
     let mut rotation = vec![0.0; 2 * mesh.nodes.len()];
     let mut mean = vec![0.0; 2 * mesh.nodes.len()];
     let share = 1.0 / bore.edges.len() as f64;
@@ -507,7 +507,7 @@ fn bore_averages(mesh: &WheelMesh, bore: &BoreContact, holding: Holding) -> (Vec
         rotation[2 * n] = -y / r2;
         rotation[2 * n + 1] = x / r2;
     }
-    (rotation, mean)
+    (rotation.into_iter().enumerate().filter(|(_, w)| *w != 0.0).collect(), mean)
 }
 
 #[cfg(test)]
@@ -526,8 +526,8 @@ mod tests {
             let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
             let (mesh, _) = problem.wheels();
             let rotation = |of: &dyn Fn([f64; 2]) -> [f64; 2]| -> f64 {
-                let field = mesh.nodes.iter().flat_map(|&x| of(x));
-                field.zip(&problem.rotation_weights).map(|(u, w)| u * w).sum()
+                let field: Vec<f64> = mesh.nodes.iter().flat_map(|&x| of(x)).collect();
+                problem.rotation_weights.iter().map(|(k, w)| w * field[*k]).sum()
             };
             let turned = rotation(&|[x, y]| [-1e-3 * y, 1e-3 * x]);
             assert!((turned - 1e-3).abs() < 1e-12, "{holding:?}: {turned}");
