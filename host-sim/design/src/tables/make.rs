@@ -189,7 +189,11 @@ pub fn make(
     let left =
         over_turns(drive) + planned_increments(drive, settings, plan.torque_nodes_n_m.len() / 2, chosen.known.len());
     expected.store(done.load(Ordering::Relaxed) + left, Ordering::Relaxed);
-    let mut swept = sweep_turns(drive, kind, &plan, &chosen.known, &sampler, settings.solver, &report)?;
+    let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
+    // Tips are looked at on a core that the sweep leaves idle.
+    let sweep = || sweep_turns(drive, kind, &plan, &chosen.known, &sampler, settings.solver, &report);
+    let (swept, tips) = rayon::join(sweep, || tips_that_bear(drive, kind, largest_n_m));
+    let mut swept = swept?;
     swept.work.add(chosen.work);
     let peak_flank_pressure_mpa = swept.work.peak_flank_pressure_mpa;
     let wall_s = || clock.elapsed().as_secs_f64();
@@ -207,7 +211,6 @@ pub fn make(
         }
     };
     made.info.torque_nodes_resolved = Some(chosen.resolved);
-    let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
     let table = flexspline::Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
     made.info.remarks.extend(empirical_percent(&table).map(|percent| {
         let [_, whole] = made.info.wind_up_arcsec;
@@ -222,7 +225,7 @@ pub fn make(
         max_von_mises_mpa: None,
         root_fillet_mpa: None,
         peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
-        tip_contact: tips_that_bear(drive, kind, largest_n_m).ok().flatten(),
+        tip_contact: tips.ok().flatten(),
         slope_bound: Some(f64::from(made.info.slope_bound)),
     };
     made.info.cautions = Caution::of_stiffness(drive).into_iter().chain(looked.cautions()).collect();
