@@ -658,6 +658,7 @@ mod tests {
             next_experiment: None,
             experiment_for_asked: None,
             zeros: Vec::new(),
+            fitted_faults: Vec::new(),
             set_aside: None,
             trace: Trace::default(),
         }
