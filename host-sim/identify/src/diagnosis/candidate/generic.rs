@@ -85,8 +85,8 @@ fn measured(mut law: Law) -> Law {
     law
 }
 
-/// Spread of a fault of the data before the rows say anything, arcsec. *Guess*: beyond a few hundred nobody takes it for
-/// the drive.
+/// Spread of a fault of the data before the rows say anything, arcsec. *Guess*: beyond a few hundred nobody takes it
+/// for the drive.
 const OF_A_FAULT: f64 = 300.0;
 
 /// A fault of the data that adds this to the error.
