@@ -252,7 +252,6 @@ impl<'a> Search<'a> {
                         slow.push(line);
                     }
                 }
-                let step = remainder::step(&problem, &selected, noise).map(|(session, at)| index_step(session, at));
                 explained = remainder::explained(&problem, &selected);
                 // What hung once hung, whatever is taken for it later.
                 for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained, noise.white)) {
@@ -264,6 +263,9 @@ impl<'a> Search<'a> {
                 let hangs = pairs().zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
                 other_rows = hangs || pairs().filter(|(a, b)| a != b).count() > on.rows.len() / 200;
                 uncertain = doubtful;
+                // Where the output was just found to hang, what is left is not known yet.
+                let step = if hangs { None } else { remainder::step(on, &explained, &uncertain, noise.white) };
+                let step = step.map(|(session, at)| index_step(session, at));
                 let step = step.filter(|step| laws.iter().all(|law| law.label != step.label));
                 let more: Vec<Law> = slow.iter().map(|found| line(found.per, found.order)).chain(step).collect();
                 new_line = !more.is_empty();

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use super::base::WIDER;
-use super::candidate::{Acting, Law, Per, together};
+use super::candidate::{Acting, Excitation, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
@@ -82,16 +82,16 @@ const BESIDE_A_STEP: usize = 16;
 /// causes are separated.
 const SEEN_OF_A_STEP: f64 = 6.0;
 
-/// Where the residual steps most from one row to the next, both of which count, and stays until the session ends: the
-/// session, and when in it, s.
+/// Where what is left beside what is `explained` steps most from one row to the next, both of which count, and stays
+/// until the session ends: the session, and when in it, s.
 #[must_use]
-pub(crate) fn step(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Option<(usize, f64)> {
-    let (on, rows, uncertain) = (problem.on, problem.on.rows, &problem.uncertain);
+pub(crate) fn step(on: &Excitation<'_>, explained: &[f64], uncertain: &[bool], white: f64) -> Option<(usize, f64)> {
+    let rows = on.rows;
     // Where no load says which flank carries, one as wide as the clearance may be a change of flank.
     let unknown =
         if on.scales.load > on.nominal.friction_torque_n_m { 0.0 } else { 2.0 * WIDER * on.base.half_backlash };
-    let least = unknown.max(SEEN_OF_A_STEP * noise.white);
-    let left = problem.on.left(&explained(problem, selected));
+    let least = unknown.max(SEEN_OF_A_STEP * white);
+    let left = on.left(explained);
     let counts = |k: usize| f64::from(u8::from(!uncertain[k]));
     let mut strongest: Option<(f64, usize, usize)> = None;
     for (number, session) in rows.sessions.iter().enumerate().filter(|(number, _)| rows.used[*number]) {
@@ -102,7 +102,7 @@ pub(crate) fn step(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise)
             let after = count - before;
             if before.min(after) >= BESIDE_A_STEP as f64 && !uncertain[k] && !uncertain[k - 1] {
                 let size = (sum - sum_before) / after - sum_before / before;
-                let sharp = (left[k] - left[k - 1] - size).abs() < STEP_AGREES * size.abs() + 4.0 * noise.white;
+                let sharp = (left[k] - left[k - 1] - size).abs() < STEP_AGREES * size.abs() + 4.0 * white;
                 let strength = size * size * before * after / count;
                 if sharp && size.abs() > least && strongest.is_none_or(|of| strength > of.0) {
                     strongest = Some((strength, number, k));

@@ -742,27 +742,32 @@ fn a_sensor_put_back_elsewhere_before_each_session_is_told_of_the_data_and_the_d
 }
 
 #[test]
-fn a_lost_index_and_a_drift_are_told_of_the_data_beside_a_load_that_nobody_recorded() {
-    let gravity = "gravity_torque:torque_n_m=7,phase_rad=0.4";
-    let faults_of = |sessions: &[Session]| {
+fn a_lost_index_and_a_drift_are_told_of_the_data_beside_a_cause() {
+    let encoder = "output_encoder_eccentricity:amplitude_arcsec=15,phase_rad=0.7";
+    let faults_of = |what: &str, sessions: &[Session]| {
         let found = diagnose(sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
         let said = (found.verdict, names(&found), found.unexplained.len());
-        assert_eq!(said, (Verdict::Explained, vec![CauseName::GravityTorque], 0), "{}", found.text());
+        assert_eq!(
+            said,
+            (Verdict::Explained, vec![CauseName::OutputEncoderEccentricity], 0),
+            "{what}: {}",
+            found.text()
+        );
         found.fitted_faults
     };
-    let sessions = recorded(&[gravity], 5, 3000, 100.0, 2.0, 72);
-    assert_eq!(faults_of(&sessions), []);
+    let sessions = recorded(&[encoder], 5, 3000, 100.0, 2.0, 72);
+    assert_eq!(faults_of("sound", &sessions), []);
     let (mut lost, mut drifts) = (sessions.clone(), sessions);
     lost[1].error_rad[1300..].iter_mut().for_each(|error| *error += 60.0 / ARCSEC_PER_RAD);
     lost[2..].iter_mut().flat_map(|of| &mut of.error_rad).for_each(|error| *error += 60.0 / ARCSEC_PER_RAD);
-    let [lost] = faults_of(&lost)[..] else { panic!("one fault") };
+    let [lost] = faults_of("lost", &lost)[..] else { panic!("one fault") };
     assert_eq!((lost.name, lost.session), (FaultName::EncoderIndexJump, 1));
     assert!((lost.since_s - 13.0).abs() < 0.02 && (lost.size.value - 60.0).abs() < 2.0, "{lost:?}");
     for session in &mut drifts {
         let rows = session.error_rad.iter_mut().zip(session.time_s.iter().flatten());
         rows.for_each(|(error, time)| *error += 300.0 * time / 3600.0 / ARCSEC_PER_RAD);
     }
-    let [drift] = faults_of(&drifts)[..] else { panic!("one fault") };
+    let [drift] = faults_of("drifts", &drifts)[..] else { panic!("one fault") };
     assert!(drift.name == FaultName::Drift && (drift.size.value / 300.0 - 1.0).abs() < 0.1, "{drift:?}");
 }
 
