@@ -48,7 +48,7 @@ impl Normal {
 }
 
 /// An orthonormal basis of columns: what a fit leaves free.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct FreeSpan(Vec<Vec<f64>>);
 
 impl FreeSpan {

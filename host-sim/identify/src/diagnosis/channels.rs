@@ -59,6 +59,7 @@ const CUT: f64 = 5.0;
 const MOST_GOES_ON: f64 = 0.9;
 
 /// A sample of the rows with what floats freely taken out of their error.
+#[derive(Clone)]
 struct Sampled<'a> {
     rows: &'a Rows,
     against: (&'a Nominal, Option<&'a Table<'a>>),
@@ -435,14 +436,15 @@ pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, ta
     let Some(rows) = followed(recording, nominal) else { return };
     let stated = nominal.friction_torque_n_m;
     let of = if stated > 0.0 { stated } else { FRICTION_OF_LOAD * rows.load_scale() };
+    let sampled = Sampled::new(&rows, (nominal, table));
     let leaves = |friction_torque_n_m: f64| {
-        let nominal = Nominal { friction_torque_n_m, ..nominal.clone() };
-        let sampled = Sampled::new(&rows, (&nominal, table));
+        let other = Nominal { friction_torque_n_m, ..nominal.clone() };
+        // What floats does not depend on it.
+        let sampled = Sampled { against: (&other, table), ..sampled.clone() };
         let by_law = PlayLaw::ALL.map(|law| {
-            let (_, mut left) = sampled.of(law, [0.0; 4], false);
+            let (beside, left) = sampled.of(law, [0.0; 4], false);
             let penalty = if law == PlayLaw::Smooth { FAR_LESS } else { 1.0 };
-            left.iter_mut().for_each(|left| *left /= penalty);
-            (std::array::from_fn(|_| 0.0), left)
+            (beside, left.into_iter().map(|left| left / penalty).collect())
         });
         least(&by_law, None).clone()
     };
@@ -451,7 +453,6 @@ pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, ta
     let Some((n_m, best)) = tried.iter().min_by(|a, b| sum(&a.1, None).total_cmp(&sum(&b.1, None))) else { return };
     let left = sum(best, None) / sum(&as_stated, None);
     // A load that nobody read changes the flank elsewhere, too.
-    let sampled = Sampled::new(&rows, (nominal, table));
     let rivals = || sampled.tried(PlayLaw::Held, [0.0; 4], CONSTANT.start..RIVALS.end);
     if left <= 1.0 - LEAST_GAIN
         && is_certain(&as_stated, best, GAIN_CERTAIN)

@@ -327,8 +327,7 @@ pub fn diagnose_rows(
     mut progress: impl FnMut(usize, usize, &str),
 ) -> Result<Diagnosed, PipelineError> {
     let pitch_radius_mm = subject.drive.circular_spline.pitch_radius_mm();
-    let faults = recording.faults.clone();
-    let settings = Settings { pitch_radius_mm, faults: &faults, ..*settings };
+    let settings = Settings { pitch_radius_mm, faults: &recording.faults, ..*settings };
     let (nominal, table) = subject.against();
     let (mut diagnosis, extended) =
         diagnose(&recording.sessions, nominal, table, &settings, |done, of, what| progress(done, of + 1, what))?;

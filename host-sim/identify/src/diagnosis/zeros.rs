@@ -52,13 +52,13 @@ pub(super) fn judge_taken_out(recording: &mut Recording, fitted: &BTreeMap<Strin
         let by = if is_there { -more.value } else { 1.0 } / ARCSEC_PER_RAD;
         let rows = sessions.iter_mut().flat_map(|session| &mut session.error_rad);
         rows.zip(column).for_each(|(error, taken_out)| *error += by * taken_out);
-        let share = 1.0 + more.value;
-        let std = fault.size_arcsec.map_or(0.0, |size| (more.std * size).abs());
-        [&mut fault.size_arcsec, &mut fault.measures.arcsec_per_hour].into_iter().flatten().for_each(|of| *of *= share);
-        fault.what += &format!(
-            "; with all that the drive does fitted beside it, it is {:.1} arcsec (standard deviation {std:.1})",
-            fault.size_arcsec.unwrap_or_default()
-        );
+        if let Some(size) = &mut fault.size_arcsec {
+            let std = (more.std * *size).abs();
+            *size *= 1.0 + more.value;
+            fault.what += &format!(
+                "; with all that the drive does fitted beside it, it is {size:.1} arcsec (standard deviation {std:.1})"
+            );
+        }
         is_there
     });
 }
