@@ -20,8 +20,9 @@ pub(super) struct Row {
     pub left_arcsec: f64,
     /// Which fold it belongs to.
     pub fold: usize,
-    /// Its place among the loads of all rows that were looked at.
+    /// Its place among the loads of all rows that were looked at, and its line in the file.
     pub number: usize,
+    pub line: u64,
 }
 
 /// A part with its penalty.

@@ -30,7 +30,9 @@ use flexspline::{ImageError, Table};
 use flexspline_make::{ProjectError, WriteError};
 use serde::Serialize;
 
-use crate::measurement::{Fault, FaultName, MeasuredError, Recording, Session, least_and_most};
+use crate::measurement::{
+    Fault, FaultName, MeasuredError, Recording, Session, least_and_most, median_of, whole_pitches,
+};
 use crate::misfit::LEAVES;
 use crate::residual::{is_no_noise, strongest};
 pub use at_rest::{LoopFigure, TorqueLoop};
@@ -97,6 +99,10 @@ const OTHER_RATIO: f64 = 0.25;
 const LEAST_OF_OTHER_RATIO_RAD: f64 = 0.0044;
 /// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
 pub(crate) const MOST_ERROR_RAD: f64 = 0.0175;
+/// A change of the error between two rows is a leap from this on, rad, and from this multiple of the usual one. *Guess*:
+/// fifteen arc-minutes, half a pitch of fine teeth, where clearance and wind-up are a few.
+const LEAP_RAD: f64 = 0.0044;
+const FAR_LARGER: f64 = 10.0;
 /// Arcsec that are taken for rounding.
 const ROUNDING_ARCSEC: f64 = 1e-6;
 /// Coefficients of the play, and so the times that one of them is put on its bound and the others fitted anew.
@@ -106,6 +112,10 @@ const OTHER_PACE: f64 = 1.25;
 /// Correlation of the load with waves of the output from which on they cannot be told apart well: half of the load's
 /// squares. *Guess*.
 pub(crate) const TURNS_WITH_THE_OUTPUT: f64 = 0.7;
+/// A step is whole tooth pitches within this share of one. *Guess*: noise and ripple are a third of that.
+const WHOLE_PITCH: f64 = 0.02;
+/// Indices that an encoder loses in some logs, at most. *Guess*: a few in a recording.
+const MOST_LOST: usize = 8;
 /// Temperatures closer than this, K, are one.
 pub(crate) const ONE_TEMPERATURE_K: f64 = 2.0;
 
@@ -392,16 +402,30 @@ pub struct Calibrated {
     pub shown: Vec<[f64; 3]>,
 }
 
+/// The error of a session about its mean, without changes between two rows that are far larger than all others: teeth
+/// that skip, an index that is lost.
+fn without_leaps(error_rad: &[f64]) -> Vec<f64> {
+    let change = |k: usize| error_rad[k] - error_rad[k.saturating_sub(1)];
+    let usual = median_of(&mut (0..error_rad.len()).map(|k| change(k).abs()).collect::<Vec<f64>>());
+    let is_leap = |change: &f64| change.abs() > LEAP_RAD.max(FAR_LARGER * usual);
+    let leapt = |leapt: &mut f64, k: usize| {
+        *leapt += Some(change(k)).filter(is_leap).unwrap_or(0.0);
+        Some(error_rad[k] - *leapt)
+    };
+    let left: Vec<f64> = (0..error_rad.len()).scan(0.0, leapt).collect();
+    let middle = mean(&left);
+    left.into_iter().map(|error| error - middle).collect()
+}
+
 /// Refuses a ratio that the rows of a log contradict; says so alone where it may be rounded, or the output moves little
 /// and errs by less than `by_a_load_rad`, rms: a load that grows over a few rows looks the same.
 pub(crate) fn check_ratio_of(log: &Recording, ratio: f64, by_a_load_rad: f64) -> Result<Option<String>, MeasuredError> {
     let (mut output, mut error) = (Vec::new(), Vec::new());
     for session in &log.sessions {
         let angles: Vec<f64> = session.generator_rad.iter().map(|psi| psi / ratio).collect();
-        for (all, values) in [(&mut output, &angles), (&mut error, &session.error_rad)] {
-            let middle = mean(values);
-            all.extend(values.iter().map(|value| value - middle));
-        }
+        let middle = mean(&angles);
+        output.extend(angles.iter().map(|angle| angle - middle));
+        error.extend(without_leaps(&session.error_rad));
     }
     let [xx, xe, ee] = [(&output, &output), (&output, &error), (&error, &error)].map(|(a, b)| dot(a, b));
     let found = ratio / (1.0 + xe / xx);
@@ -477,10 +501,11 @@ struct FitOfLogs<'f> {
 
 /// What is said of the fit to logs.
 fn calibrated<T>(
-    files: &[Recording],
-    prior: &Prior<'_>,
+    given: &[Recording],
+    known: &Prior<'_>,
     say: impl FnOnce(FitOfLogs<'_>) -> Result<T, CalibrationError>,
 ) -> Result<T, CalibrationError> {
+    let (files, prior) = (given, known);
     if let Some([one, other]) = given_twice(files) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
@@ -491,6 +516,15 @@ fn calibrated<T>(
     let parted = files.iter().flat_map(|file| by_zeros(file, |session| session.own_zero));
     let mut files: Vec<Recording> = parted.collect();
     if let Some(anew) = set_anew(&files, prior) {
+        // Sessions before a lost index and behind it have other zeros, too.
+        let recorded = Recorded::of(&files, prior);
+        let rows = settled(&files, prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
+        let plain = fit(rows, prior, &recorded, &[]).ok();
+        if let Some(parted) =
+            plain.and_then(|fitted| at_lost_index(given, &files, (&fitted.rows, &fitted.model), prior))
+        {
+            return calibrated(&parted, known, say);
+        }
         files = anew;
         said.push(SET_ANEW.to_owned());
     }
@@ -521,7 +555,14 @@ fn calibrated<T>(
     let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
     let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
     let (files, recorded) = (&files, &recorded);
-    fit_with_table(files, prior, (&rows, recorded))
+    let fitted = fit(rows.clone().less(prior), prior, recorded, &[]);
+    let open = fitted.as_ref().ok();
+    if let Some(parted) = open.and_then(|Fitted { rows, model, .. }| at_lost_index(given, files, (rows, model), prior))
+    {
+        return calibrated(&parted, known, say);
+    }
+    fitted
+        .and_then(|fitted| with_table(fitted, files, prior, (&rows, recorded)))
         .and_then(|(fitted, made)| {
             say(FitOfLogs { files, delays, zeros, prior, alignment, recorded, fitted, made, said })
         })
@@ -540,6 +581,36 @@ fn by_zeros(file: &Recording, begins: impl Fn(&Session) -> bool) -> Vec<Recordin
         (first.faults, first.notes) = (file.faults.clone(), file.notes.clone());
     }
     pieces
+}
+
+/// The logs `given` with another zero from where an encoder lost its index, in what a model leaves of `rows` of them,
+/// then in `files`; none where it lost none.
+fn at_lost_index(
+    given: &[Recording],
+    files: &[Recording],
+    (rows, model): (&Rows, &Model),
+    prior: &Prior<'_>,
+) -> Option<Vec<Recording>> {
+    let faults = given.iter().flat_map(|file| &file.faults);
+    if faults.filter(|fault| fault.name == FaultName::EncoderIndexJump).count() >= MOST_LOST {
+        return None;
+    }
+    let (log, line, size_arcsec) = rows.lost_index(model)?;
+    let mut parted = given.to_vec();
+    let file = parted.iter_mut().find(|file| file.file == files[log].file)?;
+    let at = |session: &Session| session.line.iter().position(|of| *of == line);
+    let (place, row) = file.sessions.iter().enumerate().find_map(|(k, session)| Some((k, at(session)?)))?;
+    let whole = file.sessions[place].clone();
+    let behind = Session { own_zero: true, ..whole.part(row..whole.len()) };
+    let pitches = whole_pitches(size_arcsec / ARCSEC_PER_RAD, &prior.nominal.gear(), WHOLE_PITCH, 0.0);
+    let or = match pitches {
+        Some(pitches) => format!("teeth have skipped by {pitches}"),
+        None => "a load that is not recorded has turned the flank over".to_owned(),
+    };
+    let then = format!(", or {or}; the zero behind it is fitted on its own");
+    file.faults.push(Fault::lost_index(&whole, row, size_arcsec, &then));
+    file.sessions.splice(place..=place, [whole.part(0..row), behind]);
+    Some(parted)
 }
 
 /// Logs in pieces of a session each, if sessions have zeros of their own: these leave far less than
@@ -591,6 +662,19 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         sessions.extend(piece.sessions);
     }
     log.sessions = sessions;
+    // Behind a lost index the output has another zero.
+    for _ in 0..MOST_LOST {
+        let given = std::slice::from_ref(&log);
+        let files: Vec<Recording> = by_zeros(&log, |session| session.own_zero);
+        let recorded = Recorded::of(&files, &prior);
+        let rows = settled(&files, &prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
+        let none = Model { chosen: Vec::new(), coefficients: Vec::new(), scales: recorded.scales };
+        let Some(parted) = at_lost_index(given, &files, (&rows, &none), &prior).and_then(|mut parted| parted.pop())
+        else {
+            break;
+        };
+        log = parted;
+    }
     if set_anew(std::slice::from_ref(&log), &prior).is_some() {
         log.sessions.iter_mut().for_each(|session| session.own_zero = true);
         log.notes.push(SET_ANEW.to_owned());
@@ -598,17 +682,17 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     log
 }
 
-/// The fit whose table can be made, and that table.
-fn fit_with_table(
+/// The fit whose table can be made, and that table: this one, or one with fewer parts.
+fn with_table(
+    fitted: Fitted,
     files: &[Recording],
     prior: &Prior<'_>,
     (rows, recorded): (&Rows, &Recorded),
 ) -> Result<(Fitted, MadeTable), CalibrationError> {
-    let fitted_without = |without: &[Without]| {
-        let fitted = fit(rows.clone().less(prior), prior, recorded, without)?;
-        fitted.is_worth_a_table(recorded, prior, files).map(|()| fitted)
-    };
-    let fitted = fitted_without(&[])?;
+    let worth_it = |fitted: Fitted| fitted.is_worth_a_table(recorded, prior, files).map(|()| fitted);
+    let fitted_without =
+        |without: &[Without]| fit(rows.clone().less(prior), prior, recorded, without).and_then(worth_it);
+    let fitted = worth_it(fitted)?;
     Ok(match table::make(prior, &fitted.model, recorded) {
         // A table has no wind-up that falls with the load, none that the lag outruns, and no lag that leads.
         Err(error) if error.is_of_a_fall() => {

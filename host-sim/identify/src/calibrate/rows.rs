@@ -2,11 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use super::Model;
 use super::folds::{Folds, Row};
-use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State};
+use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State, flank};
 use super::prior::Prior;
 use crate::least_squares::Normal;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
+use crate::residual::lasting_step;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -261,7 +263,8 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     log: zero,
                 };
                 let measured_arcsec = session.error_rad[k] * ARCSEC_PER_RAD;
-                all.rows.push(Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0, number: all.loads.len() - 1 });
+                let (number, line) = (all.loads.len() - 1, session.line[k]);
+                all.rows.push(Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0, number, line });
             }
         }
         // Zeros of encoders are large numbers that squares do not like.
@@ -323,6 +326,39 @@ impl Rows {
         let about = fit.square - fit.right[0] * fit.right[0] / count;
         let explained = about - fit.misfit();
         if about > 0.0 { (explained / about).clamp(0.0, 1.0).sqrt() } else { 0.0 }
+    }
+
+    /// Where an encoder lost its index, in what a model leaves: the log, the line from which on the error has another
+    /// zero, and how far that is off, arcsec.
+    pub(crate) fn lost_index(&self, model: &Model) -> Option<(usize, u64, f64)> {
+        // Rows that do not count, and the end of a session, keep those beside them apart.
+        let place = |row: &Row| row.number + self.loads[row.number].0;
+        let mut left = vec![None; place(self.rows.last()?) + 1];
+        for row in &self.rows {
+            left[place(row)] = Some(row.left_arcsec - model.adds_arcsec(&row.at));
+        }
+        let columns = || {
+            let logs = self.means_arcsec.len();
+            let mut columns = vec![vec![0.0; left.len()]; logs + model.coefficients.len()];
+            for row in &self.rows {
+                columns[row.at.log][place(row)] = 1.0;
+                let of_parts = columns[logs..].iter_mut().zip(model.columns(&row.at));
+                of_parts.for_each(|(column, value)| column[place(row)] = value);
+            }
+            columns
+        };
+        // A flank that changes is none.
+        let flank = |row: &Row| flank(&row.at, model.scales.friction_n_m);
+        let stays = |w: &&[Row]| w[0].at.way == w[1].at.way && flank(&w[0]) == flank(&w[1]);
+        let logs = self.rows.chunk_by(|a, b| a.at.log == b.at.log);
+        let places = logs.flat_map(|rows| {
+            let [begin, end] = [&rows[0], &rows[rows.len() - 1]].map(place);
+            rows.windows(2).filter(stays).map(move |w| (place(&w[1]), begin..end + 1))
+        });
+        let in_order: Vec<f64> = left.iter().flatten().copied().collect();
+        let (at, size) = lasting_step(&left, columns, places, (white_noise([in_order.as_slice()]), 0.0))?;
+        let row = self.rows.iter().find(|row| place(row) == at)?;
+        Some((row.at.log, row.line, size))
     }
 
     /// Those of some logs.

@@ -456,7 +456,7 @@ fn a_sum_over_folds_is_the_fit_to_the_rows() {
                 way: 1.0,
                 ..State::default()
             };
-            Row { at, measured_arcsec: 0.0, left_arcsec: 7.0 * psi.sin() + 3.0, fold: k / 50, number: k }
+            Row { at, measured_arcsec: 0.0, left_arcsec: 7.0 * psi.sin() + 3.0, fold: k / 50, number: k, line: 0 }
         })
         .collect();
     let folds = Folds::new(&rows, &[PartName::GeneratorAngle], &scales, 1, false);

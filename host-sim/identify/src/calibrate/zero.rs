@@ -262,7 +262,7 @@ mod tests {
         let rows = [(); 2000].map(|()| {
             let at = State { generator_rad: 700.0 * random.f64(), way: 1.0, ..State::default() };
             let measured_arcsec = wave(at.generator_rad, 0.3) + 4.0 * (random.f64() - 0.5);
-            Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0, number: 0 }
+            Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0, number: 0, line: 0 }
         });
         let says = |zero: f64| rows.iter().map(|row| wave(row.at.generator_rad, zero)).collect();
         let [zero, std] = PhaseSearch::new(&says, &rows.each_ref(), 1.0).close_to(0.14, 0.01);

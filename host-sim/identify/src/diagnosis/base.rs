@@ -151,9 +151,6 @@ const DRAG_OF_LOAD: f64 = 0.02;
 /// Prior standard deviation of what no drawing fixes, arcsec: the offset of the output encoder. *Guess*: 2.8°, so wide
 /// that the data alone decide.
 pub(super) const FREE: f64 = 1e4;
-/// Spread of what was taken out of the error before any cause was known, of its size. *Guess*: it may as well not be
-/// there, or be as large again.
-const OF_WHAT_WAS_TAKEN_OUT: f64 = 10.0;
 /// Least spread of a phase, over that of the amplitude. *Guess*: small enough to hold a phase that the nominal model
 /// fixes.
 const LEAST_TURN: f64 = 1e-3;
@@ -216,9 +213,6 @@ impl Base {
             let from = rows.sessions[*session].start;
             let values = (0..rows.len()).map(|k| f64::from(u8::from(k >= from))).collect();
             floating.push(Floating { name: "zero".into(), values, spread: FREE });
-        }
-        for (name, values) in &rows.taken_out {
-            floating.push(Floating { name: name.clone(), values: values.clone(), spread: OF_WHAT_WAS_TAKEN_OUT });
         }
         let mut add = |name: &str, values: Vec<f64>, spread: f64| {
             if spread > 0.0 && values.iter().any(|v| *v != 0.0) {

@@ -92,13 +92,11 @@ pub(super) fn waves(order: f64, angle: &[f64], places: &[usize]) -> [Vec<f64>; 2
 }
 
 /// What floats freely in every drive whatever its waves are, column by column at the places: zeros of the error and of
-/// sessions, what was taken out of it, ratio, speed, direction.
+/// sessions, ratio, speed, direction.
 fn floating(rows: &Rows, places: &[usize]) -> Vec<Vec<f64>> {
     let since = |start: usize| places.iter().map(|k| f64::from(u8::from(*k >= start))).collect();
     let zeros = rows.sessions.iter().take(MOST_ZEROS + 1).map(|session| since(session.start));
-    let taken_out = rows.taken_out.iter().map(|(_, column)| column);
-    let columns = taken_out.chain([&rows.output, &rows.speed, &rows.direction]);
-    zeros.chain(columns.map(|column| at(places, column))).collect()
+    zeros.chain([&rows.output, &rows.speed, &rows.direction].map(|column| at(places, column))).collect()
 }
 
 /// Standard deviation of a residual in the blocks in which most goes on: at a bench that loads the drive in some
@@ -418,7 +416,7 @@ fn followed(recording: &Recording, nominal: &Nominal) -> Option<Rows> {
     let share = FOLLOWED as f64 / recording.sessions.iter().map(Session::len).sum::<usize>() as f64;
     let begun = |session: &Session| session.part(0..(share.min(1.0) * session.len() as f64) as usize);
     let begun: Vec<Session> = recording.sessions.iter().map(begun).collect();
-    let rows = Rows::new(&begun, nominal).with_taken_out(&recording.faults, &begun);
+    let rows = Rows::new(&begun, nominal);
     let winds_up = rows.recorded.torque && nominal.wind_up_arcsec(1.0) != 0.0;
     (winds_up && rows.count_used() >= SAMPLE / 4).then_some(rows)
 }

@@ -48,7 +48,7 @@ use flexspline::Table;
 use thiserror::Error;
 
 use crate::causes::CauseName;
-use crate::measurement::{Fault, Session};
+use crate::measurement::Session;
 use crate::nominal::Nominal;
 use candidate::{Excitation, Label, Law, LawUnits, index_step, library, line, unnamed};
 pub use explain::Explanation;
@@ -93,8 +93,6 @@ pub struct Settings<'a> {
     pub asked: Option<CauseName>,
     /// Causes that are not considered: somebody knows that they are not there, or wants to see what the rows say then.
     pub without: &'a [CauseName],
-    /// Faults of the data of which something was taken out of the error: how much of it was there is fitted.
-    pub faults: &'a [Fault],
 }
 
 /// How finely rows are looked at, and the noise in them.
@@ -110,7 +108,7 @@ pub struct Fineness {
 
 impl Default for Settings<'_> {
     fn default() -> Self {
-        Settings { pitch_radius_mm: 48.7, asked: None, without: &[], faults: &[] }
+        Settings { pitch_radius_mm: 48.7, asked: None, without: &[] }
     }
 }
 
@@ -134,7 +132,7 @@ pub fn diagnose(
     settings: &Settings<'_>,
     mut progress: impl FnMut(usize, usize, &str),
 ) -> Result<(Diagnosis, Extended), DiagnosisError> {
-    let rows = Rows::new(sessions, nominal).with_taken_out(settings.faults, sessions);
+    let rows = Rows::new(sessions, nominal);
     check(&rows)?;
     progress(0, 4, "nominal model");
     let (base, jumps) = prepare::base(&rows, nominal, table);
@@ -258,13 +256,12 @@ impl<'a> Search<'a> {
                     *hung |= hangs;
                 }
                 let doubtful = prepare::uncertain(on, &selected.terms, &hung);
+                let step = remainder::step(&problem, &selected, (&explained, &doubtful), noise.white);
                 drop(selected);
                 let pairs = || doubtful.iter().zip(&uncertain);
                 let hangs = pairs().zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
                 other_rows = hangs || pairs().filter(|(a, b)| a != b).count() > on.rows.len() / 200;
                 uncertain = doubtful;
-                // Where the output was just found to hang, what is left is not known yet.
-                let step = if hangs { None } else { remainder::step(on, &explained, &uncertain, noise.white) };
                 let step = step.map(|(session, at)| index_step(session, at));
                 let step = step.filter(|step| laws.iter().all(|law| law.label != step.label));
                 let more: Vec<Law> = slow.iter().map(|found| line(found.per, found.order)).chain(step).collect();

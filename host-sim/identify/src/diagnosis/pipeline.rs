@@ -291,11 +291,7 @@ pub fn parse_rows(
 ) -> Result<Recording, PipelineError> {
     let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
     recording.notes.extend(subject.note.clone());
-    // Teeth that skip look like another ratio.
-    if recording.tooth_steps.is_empty() {
-        let said = check_ratio_of(&recording, subject.nominal.ratio, MOST_ERROR_RAD)?;
-        recording.notes.extend(said);
-    }
+    recording.notes.extend(check_ratio_of(&recording, subject.nominal.ratio, MOST_ERROR_RAD)?);
     if let Some((names, added)) = subject.known_arcsec(&recording, |_| true)? {
         less(&mut recording.sessions, added.iter());
         recording.notes.push(format!("the model holds {names} already; what is found is beyond that"));
@@ -327,11 +323,10 @@ pub fn diagnose_rows(
     mut progress: impl FnMut(usize, usize, &str),
 ) -> Result<Diagnosed, PipelineError> {
     let pitch_radius_mm = subject.drive.circular_spline.pitch_radius_mm();
-    let settings = Settings { pitch_radius_mm, faults: &recording.faults, ..*settings };
+    let settings = Settings { pitch_radius_mm, ..*settings };
     let (nominal, table) = subject.against();
     let (mut diagnosis, extended) =
         diagnose(&recording.sessions, nominal, table, &settings, |done, of, what| progress(done, of + 1, what))?;
-    zeros::judge_taken_out(&mut recording, &diagnosis.recalibrated);
     zeros::tell(&mut recording, &diagnosis.zeros);
     diagnosis.fitted_faults.iter().for_each(|fault| zeros::tell_fitted(&mut recording, fault));
     if recording.unusable.is_some() {

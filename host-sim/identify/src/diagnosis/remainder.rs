@@ -4,15 +4,14 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use super::base::WIDER;
-use super::candidate::{Acting, Excitation, Law, Per, together};
+use super::candidate::{Acting, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
 use super::rows::{Rows, combined, rms};
 use super::select::{self, Selected, less};
 use super::thresholds::remainder::*;
-use crate::measurement::STEP_AGREES;
-use crate::residual::{is_no_noise, strongest};
+use crate::residual::{is_no_noise, lasting_step, strongest};
 
 /// Highest order per generator turn up to which lines are looked for. *Guess*: above what bearings make, below the
 /// tooth mesh of ratios above 75, which has models of its own.
@@ -31,16 +30,20 @@ pub(crate) struct SpectralLine {
     pub size_arcsec: f64,
 }
 
-/// The part of the error that base and terms explain in addition to the nominal prediction, row by row, arcsec.
-#[must_use]
-pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
+/// Columns of base and terms, row by row.
+fn columns(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Vec<f64>> {
     let on = &problem.on;
     let causes: Vec<Acting<'_>> =
         selected.terms.iter().enumerate().map(|(k, term)| term.acting(selected.fit.of(k))).collect();
-    let of_causes = together(on, &causes);
-    let floating = on.base.floating.iter().map(|floating| floating.values.as_slice());
-    let columns = floating.chain(of_causes.iter().flatten().map(|column| column.values.as_slice()));
-    combined(on.rows.len(), columns, &selected.fit.solution.coefficients)
+    let floating = on.base.floating.iter().map(|floating| floating.values.clone());
+    floating.chain(together(on, &causes).into_iter().flatten().map(|column| column.values)).collect()
+}
+
+/// The part of the error that base and terms explain in addition to the nominal prediction, row by row, arcsec.
+#[must_use]
+pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
+    let columns = columns(problem, selected);
+    combined(problem.on.rows.len(), columns.iter().map(Vec::as_slice), &selected.fit.solution.coefficients)
 }
 
 /// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
@@ -76,43 +79,35 @@ pub(crate) fn lines(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
     by_angle.into_iter().chain(in_time).collect()
 }
 
-/// Rows to either side of a step, at least. *Guess*: means of a quarter of the noise of a row.
-const BESIDE_A_STEP: usize = 16;
-/// A step within one row is this many standard deviations of the white noise. *Guess*: one more than the five by which
-/// causes are separated.
-const SEEN_OF_A_STEP: f64 = 6.0;
-
-/// Where what is left beside what is `explained` steps most from one row to the next, both of which count, and stays
-/// until the session ends: the session, and when in it, s.
+/// Where an encoder lost its index, in what is left beside what is `explained`, of rows that are not `uncertain`: the
+/// session, and when in it, s.
 #[must_use]
-pub(crate) fn step(on: &Excitation<'_>, explained: &[f64], uncertain: &[bool], white: f64) -> Option<(usize, f64)> {
-    let rows = on.rows;
+pub(crate) fn step(
+    problem: &Problem<'_>,
+    selected: &Selected<'_>,
+    (explained, uncertain): (&[f64], &[bool]),
+    white: f64,
+) -> Option<(usize, f64)> {
+    let (on, rows) = (&problem.on, problem.on.rows);
     // Where no load says which flank carries, one as wide as the clearance may be a change of flank.
     let unknown =
         if on.scales.load > on.nominal.friction_torque_n_m { 0.0 } else { 2.0 * WIDER * on.base.half_backlash };
-    let least = unknown.max(SEEN_OF_A_STEP * white);
+    let mut counts = vec![false; rows.len()];
+    rows.sessions_used().for_each(|session| session.for_each(|k| counts[k] = !uncertain[k]));
     let left = on.left(explained);
-    let counts = |k: usize| f64::from(u8::from(!uncertain[k]));
-    let mut strongest: Option<(f64, usize, usize)> = None;
-    for (number, session) in rows.sessions.iter().enumerate().filter(|(number, _)| rows.used[*number]) {
-        let all = session.clone().map(|k| [counts(k), counts(k) * left[k]]);
-        let [count, sum] = all.fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
-        let [mut before, mut sum_before] = [0.0; 2];
-        for k in session.clone() {
-            let after = count - before;
-            if before.min(after) >= BESIDE_A_STEP as f64 && !uncertain[k] && !uncertain[k - 1] {
-                let size = (sum - sum_before) / after - sum_before / before;
-                let sharp = (left[k] - left[k - 1] - size).abs() < STEP_AGREES * size.abs() + 4.0 * white;
-                let strength = size * size * before * after / count;
-                if sharp && size.abs() > least && strongest.is_none_or(|of| strength > of.0) {
-                    strongest = Some((strength, number, k));
-                }
-            }
-            before += counts(k);
-            sum_before += counts(k) * left[k];
-        }
-    }
-    strongest.map(|(_, number, k)| (number, rows.since[k]))
+    let left: Vec<Option<f64>> = left.iter().zip(counts).map(|(left, counts)| counts.then_some(*left)).collect();
+    // Where rows between do not count, the flank is none of the step.
+    let follows = |k: &usize| {
+        let before = left[..*k].iter().rposition(Option::is_some);
+        before.is_some_and(|before| on.base.flank[before].signum() == on.base.flank[*k].signum())
+    };
+    let inside = rows.sessions_used().flat_map(|session| {
+        let from = session.start;
+        session.skip(1).filter(follows).map(move |k| (k, from..rows.len()))
+    });
+    let (row, _) = lasting_step(&left, || columns(problem, selected), inside, (white, unknown))?;
+    let number = rows.sessions.iter().position(|session| session.contains(&row))?;
+    Some((number, rows.since[row]))
 }
 
 /// The angle of each row in which a line repeats, rad; a second is a turn.

@@ -4,10 +4,9 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use super::zeros::{name_of, taken_out};
 pub(crate) use crate::least_squares::{add_scaled, combined};
 pub(crate) use crate::measurement::rms;
-use crate::measurement::{Fault, Session, cubic_at_zero, neighbours, quantile_of, rates};
+use crate::measurement::{Session, cubic_at_zero, neighbours, quantile_of, rates};
 use crate::nominal::Nominal;
 use flexspline::FixedMember;
 pub(super) use flexspline_base::statistics::mean;
@@ -75,8 +74,6 @@ pub struct Rows {
     pub rounding: f64,
     /// Sessions from which on the zero of the error is another one.
     pub zeros: Vec<usize>,
-    /// What was taken out of the error as a fault of the data, arcsec, and its name: how much of it was there floats.
-    pub taken_out: Vec<(String, Vec<f64>)>,
     /// Median sample period, s.
     pub period: f64,
 }
@@ -145,14 +142,6 @@ impl Rows {
         angle
     }
 
-    /// With what these faults of the data had taken out of the error of the sessions.
-    #[must_use]
-    pub(super) fn with_taken_out(mut self, faults: &[Fault], sessions: &[Session]) -> Rows {
-        let named = |fault: &Fault| Some((name_of(fault), taken_out(fault, sessions)?));
-        self.taken_out = faults.iter().filter_map(named).collect();
-        self
-    }
-
     /// Learns from these sessions alone, as far as they have rows enough.
     #[must_use]
     pub(crate) fn learning_from(mut self, used: &[bool]) -> Rows {
@@ -185,7 +174,6 @@ impl Rows {
             loudness: of(&self.loudness),
             jitters: self.jitters,
             zeros: self.zeros.clone(),
-            taken_out: Vec::new(),
             unsure_s: self.unsure_s,
             rounding: self.rounding,
             period: self.period,

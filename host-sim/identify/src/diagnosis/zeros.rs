@@ -1,12 +1,7 @@
 //! A bench that sets its zero anew in each session: reported as a fault of the data, with what each session's zero is.
-//! And what else was taken out of the error before any cause was known, which the fit with the causes judges again.
-
-use std::collections::BTreeMap;
 
 use super::report::{FittedFault, Parameter};
-use crate::measurement::{
-    Fault, FaultName, Measures, Quantity, Recording, STEP_AGREES, Session, Treatment, throughout,
-};
+use crate::measurement::{Fault, FaultName, Measures, Quantity, Recording, Treatment, throughout};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// The remedy where the zero is set anew.
@@ -14,61 +9,12 @@ const ADVICE: &str = "home to one mark before each session, or log the offset th
 /// Sessions whose offsets are printed, at most. *Guess*: they fill a line.
 const SAID: usize = 12;
 
-/// The parameter that floats where something was taken out of the error.
-pub(super) fn name_of(fault: &Fault) -> String {
-    format!("{} at line {}", fault.name.as_str(), fault.first_line)
-}
-
-/// What a fault of the data had taken out of the error of each row of all sessions, arcsec; none of any that is no sum.
-pub(super) fn taken_out(fault: &Fault, sessions: &[Session]) -> Option<Vec<f64>> {
-    let lines = sessions.iter().flat_map(|session| &session.line);
-    let column: Vec<f64> = match fault.name {
-        _ if fault.treatment != Treatment::Repaired => return None,
-        FaultName::EncoderIndexJump => {
-            let size = fault.size_arcsec?;
-            let from = lines.clone().position(|line| *line == fault.first_line)?;
-            (0..lines.count()).map(|row| if row < from { 0.0 } else { size }).collect()
-        }
-        FaultName::Drift => {
-            let times: Vec<f64> =
-                sessions.iter().flat_map(|session| session.time_s.iter().flatten().copied()).collect();
-            let middle = 0.5 * (times.first()? + times.last()?);
-            let per_s = fault.measures.arcsec_per_hour? / 3600.0;
-            times.iter().map(|time| per_s * (time - middle)).collect()
-        }
-        _ => return None,
-    };
-    Some(column)
-}
-
-/// Sets what was taken out of the error to what the fit says of it, beside the causes; what was not there (a load that
-/// nobody read changed the flank) is put back, and is no fault.
-pub(super) fn judge_taken_out(recording: &mut Recording, fitted: &BTreeMap<String, Parameter>) {
-    let sessions = &mut recording.sessions;
-    recording.faults.retain_mut(|fault| {
-        let more = fitted.get(&name_of(fault));
-        let Some((more, column)) = more.and_then(|more| Some((more, taken_out(fault, sessions)?))) else { return true };
-        let is_there = more.value.abs() <= STEP_AGREES;
-        let by = if is_there { -more.value } else { 1.0 } / ARCSEC_PER_RAD;
-        let rows = sessions.iter_mut().flat_map(|session| &mut session.error_rad);
-        rows.zip(column).for_each(|(error, taken_out)| *error += by * taken_out);
-        if let Some(size) = &mut fault.size_arcsec {
-            let std = (more.std * *size).abs();
-            *size *= 1.0 + more.value;
-            fault.what += &format!(
-                "; with all that the drive does fitted beside it, it is {size:.1} arcsec (standard deviation {std:.1})"
-            );
-        }
-        is_there
-    });
-}
-
 /// Tells a fault of the data that was found beside the causes, and takes it out of the error.
 pub(super) fn tell_fitted(recording: &mut Recording, found: &FittedFault) {
     let Parameter { value, std } = found.size;
-    let sessions = &recording.sessions;
+    let sessions = &mut recording.sessions;
     let fault = if found.name == FaultName::Drift {
-        let times = || sessions.iter().flat_map(|session| session.time_s.iter().flatten());
+        let times = || sessions.iter().flat_map(|session| session.time_s.iter().flatten().copied());
         let [Some(begin), Some(end)] = [times().next(), times().last()] else { return };
         let size_arcsec = value * (end - begin) / 3600.0;
         let Some(all) = throughout(sessions, found.name) else { return };
@@ -76,8 +22,13 @@ pub(super) fn tell_fitted(recording: &mut Recording, found: &FittedFault) {
             "the zero of the error drifts by {size_arcsec:.1} arcsec in all, {value:.1} an hour (standard deviation \
              {std:.2}), whatever else the drive does: a straight line in time is taken out"
         );
+        for session in sessions {
+            let rows = session.error_rad.iter_mut().zip(session.time_s.iter().flatten());
+            rows.for_each(|(error, time)| *error -= value / 3600.0 * (time - 0.5 * (begin + end)) / ARCSEC_PER_RAD);
+        }
         let measures = Measures { arcsec_per_hour: Some(value), ..Measures::default() };
-        Fault { size_arcsec: Some(size_arcsec), measures, what, ..all }
+        let (channel, treatment) = (Some(Quantity::Error), Treatment::Repaired);
+        Fault { size_arcsec: Some(size_arcsec), measures, what, channel, treatment, ..all }
     } else {
         let session = &sessions[found.session];
         let begins = |row: &usize| match &session.time_s {
@@ -85,17 +36,12 @@ pub(super) fn tell_fitted(recording: &mut Recording, found: &FittedFault) {
             None => *row as f64 >= found.since_s,
         };
         let Some(row) = (0..session.len()).find(begins) else { return };
-        let what = format!(
-            "the error steps by {value:.1} arcsec (standard deviation {std:.1}) within one row and stays there, \
-             whatever else the drive does: an encoder has lost its index; the step is taken out"
-        );
-        let time_s = session.time_s.as_ref().map(|time| time[row]);
-        Fault { size_arcsec: Some(value), time_s, what, ..Fault::new(found.name, [session.line[row]; 2], 1) }
+        let then = format!("; the step (standard deviation {std:.1}) is taken out");
+        let fault = Fault::lost_index(session, row, value, &then);
+        let behind = sessions[found.session..].iter_mut().flat_map(|session| &mut session.error_rad).skip(row);
+        behind.for_each(|error| *error -= value / ARCSEC_PER_RAD);
+        fault
     };
-    let fault = Fault { channel: Some(Quantity::Error), treatment: Treatment::Repaired, ..fault };
-    let taken_out = taken_out(&fault, sessions).unwrap_or_default();
-    let rows = recording.sessions.iter_mut().flat_map(|session| &mut session.error_rad);
-    rows.zip(taken_out).for_each(|(error, taken_out)| *error -= taken_out / ARCSEC_PER_RAD);
     recording.faults.push(fault);
     recording.faults.sort_by_key(|fault| (fault.first_line, fault.name));
 }
@@ -136,6 +82,7 @@ pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
 
     fn recording() -> Recording {
         let session = |k: u64| Session {
@@ -162,23 +109,6 @@ mod tests {
         assert!(fault.what.contains("+120.5, +1996.8 arcsec"), "{}", fault.what);
         assert!((fault.size_arcsec.unwrap() - 1996.75).abs() < 1e-9);
         assert!(two_far.sessions[1].own_zero && !two_far.sessions[0].own_zero);
-    }
-
-    #[test]
-    fn a_step_that_the_fit_does_not_see_is_put_back_and_no_fault() {
-        let step = |left: f64| {
-            let mut recording = recording();
-            let fault = Fault::new(FaultName::EncoderIndexJump, [120, 120], 1);
-            let treatment = Treatment::Repaired;
-            recording.faults.push(Fault { size_arcsec: Some(60.0), treatment, ..fault });
-            let left = Parameter { value: left, std: 0.01 };
-            judge_taken_out(&mut recording, &BTreeMap::from([("encoder_index_jump at line 120".to_owned(), left)]));
-            let arcsec =
-                |session: usize, row: usize| (recording.sessions[session].error_rad[row] * ARCSEC_PER_RAD).round();
-            ([arcsec(1, 19), arcsec(1, 20), arcsec(2, 0)], recording.faults.first().and_then(|fault| fault.size_arcsec))
-        };
-        assert_eq!(step(-0.98), ([0.0, 60.0, 60.0], None));
-        assert_eq!(step(0.1), ([0.0, -6.0, -6.0], Some(66.0)));
     }
 
     #[test]

@@ -16,9 +16,6 @@ impl Recording {
             let line = session.line.iter().copied().step_by(together).collect();
             *session = session.each(line, |values| values.chunks(together).map(mean).collect());
         }
-        for step in &mut self.tooth_steps {
-            step.row /= together;
-        }
         let left: usize = self.sessions.iter().map(Session::len).sum();
         self.notes.push(format!(
             "{rows} rows: every {together} neighbours are averaged, {left} rows are diagnosed; what repeats within \

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::Session;
 use super::columns::Quantity;
 
 table! {
@@ -129,6 +130,18 @@ impl Fault {
         }
     }
 
+    /// An index that an encoder lost before a row of a session: the error steps, by about so much, and stays.
+    pub(crate) fn lost_index(session: &Session, row: usize, size_arcsec: f64, then: &str) -> Fault {
+        let what = format!(
+            "the error steps by {size_arcsec:.1} arcsec within one row and stays there, whatever else the drive does: \
+             an encoder has lost its index{then}"
+        );
+        let time_s = session.time_s.as_ref().map(|time| time[row]);
+        let fault = Fault::new(FaultName::EncoderIndexJump, [session.line[row]; 2], 1);
+        let (channel, treatment) = (Some(Quantity::Error), Treatment::Repaired);
+        Fault { size_arcsec: Some(size_arcsec), time_s, what, channel, treatment, ..fault }
+    }
+
     /// A fault of these rows, each a line and its time (s), in the order of the file; none without rows.
     pub(super) fn of_rows(name: FaultName, rows: impl IntoIterator<Item = (u64, Option<f64>)>) -> Option<Fault> {
         let mut rows = rows.into_iter();
@@ -166,22 +179,4 @@ pub struct Measures {
     /// Rate of a drift, arcsec/h.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arcsec_per_hour: Option<f64>,
-}
-
-/// A lasting step of the error that is a whole number of tooth pitches: the drive has ratcheted.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ToothStep {
-    /// Session, from 0.
-    pub session: usize,
-    /// First row of the session after the step.
-    pub row: usize,
-    /// Line of that row.
-    pub line: u64,
-    /// When, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub time_s: Option<f64>,
-    /// Size, arcsec at the output; positive: the output has gained on the generator.
-    pub size_arcsec: f64,
-    /// Tooth pitches, with the sign of the size.
-    pub pitches: i32,
 }

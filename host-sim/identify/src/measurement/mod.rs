@@ -23,11 +23,10 @@ use std::path::Path;
 
 pub(crate) use columns::MappedColumn;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
-pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
+pub use fault::{Fault, FaultName, Measures, Treatment};
 use faults::clock::SESSION_GAP_PERIODS;
-pub(crate) use faults::steps::AGREES as STEP_AGREES;
 pub(crate) use faults::units::other_reading;
-pub(crate) use faults::{LineFit, throughout};
+pub(crate) use faults::{LineFit, throughout, whole_pitches};
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,
 };
@@ -219,8 +218,6 @@ pub struct Recording {
     pub sessions: Vec<Session>,
     /// Faults of the data.
     pub faults: Vec<Fault>,
-    /// Where the drive ratcheted; these steps are in the sessions still.
-    pub tooth_steps: Vec<ToothStep>,
     /// Notes that are no faults, one sentence each.
     pub notes: Vec<String>,
     /// Why nothing can be said of the drive from these rows, if so.
@@ -292,13 +289,12 @@ pub(crate) fn parse_at_least(
     faults::reads::check(&mut log, gear, &mut findings);
     faults::outliers::check(&mut log, gear, &mut findings);
     faults::resolution::check(&mut log, gear, &mut findings);
-    faults::steps::check(&mut log, gear, &mut findings);
     let mut sessions = log.into_sessions();
     // Each session of a guide log, whose columns nobody maps, has its own zero.
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= columns.is_empty());
-    let Findings { mut faults, tooth_steps, notes, .. } = findings;
+    let Findings { mut faults, notes, .. } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));
-    Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
+    Ok(Recording { file: file.to_owned(), rows, sessions, faults, notes, unusable: None })
 }
 
 /// Mends clock and holes of a log and leaves out the rows without an angle; how many had which angle.
@@ -393,8 +389,8 @@ impl Recording {
     /// Made-up sessions, without a fault.
     pub(crate) fn made(file: &str, sessions: Vec<Session>) -> Recording {
         let rows = sessions.iter().map(Session::len).sum();
-        let (faults, tooth_steps, notes) = (Vec::new(), Vec::new(), Vec::new());
-        Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None }
+        let (faults, notes) = (Vec::new(), Vec::new());
+        Recording { file: file.to_owned(), rows, sessions, faults, notes, unusable: None }
     }
 }
 

@@ -244,7 +244,6 @@ mod tests {
     #[test]
     fn each_fault_is_found_by_its_name_in_what_is_read_back() {
         for (effect, name) in [
-            ("encoder_index_jump:size_arcsec=200", FaultName::EncoderIndexJump),
             ("frozen_channel:channel=output,duration_s=3", FaultName::FrozenChannel),
             ("missing_samples", FaultName::MissingSamples),
             ("clock_error", FaultName::ClockError),

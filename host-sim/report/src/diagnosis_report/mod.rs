@@ -23,7 +23,7 @@ use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
 use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Unexplained, Verdict};
 use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::diagnosis::{Extended, Series, WrittenTable};
-use flexspline_identify::measurement::{Fault, Recording, Session, ToothStep};
+use flexspline_identify::measurement::{Fault, Recording, Session};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::Picture;
 use thin::Clock;
@@ -155,7 +155,6 @@ impl DiagnosisKnown<'_> {
         let results = [
             ("diagnosis", json!(diagnosis)),
             ("data_faults", json!(recording.faults)),
-            ("tooth_steps", json!(recording.tooth_steps)),
             ("notes", json!(recording.notes)),
         ];
         let name = std::path::Path::new(&recording.file).file_name();
@@ -259,7 +258,7 @@ impl DiagnosisKnown<'_> {
         Headline::new(answer, number, number_is)
     }
 
-    /// The table, faults of the data, a sentence each, and steps of whole teeth.
+    /// The table, and faults of the data, a sentence each.
     fn remarks(&self) -> Vec<String> {
         const FIRST: usize = 5;
         let recording = self.sources.recording;
@@ -269,12 +268,6 @@ impl DiagnosisKnown<'_> {
         remarks.extend(recording.faults.iter().take(FIRST).map(fault));
         if recording.faults.len() > FIRST {
             remarks.push(format!("{} more data faults are in the table below.", recording.faults.len() - FIRST));
-        }
-        if !recording.tooth_steps.is_empty() {
-            remarks.push(format!(
-                "The output is off by whole teeth after {} steps: the drive has ratcheted, or was re-assembled.",
-                recording.tooth_steps.len()
-            ));
         }
         remarks
     }
@@ -502,14 +495,6 @@ impl DiagnosisKnown<'_> {
             let header = ["Fault", "When", "Lines of the file", "Rows", "Size", "Done", "What it is", "What to change"];
             blocks.extend(limited("Faults of the data", &header, &recording.faults, row));
         }
-        if !recording.tooth_steps.is_empty() {
-            let row = |step: &ToothStep| {
-                let when = step.time_s.map_or_else(|| format!("line {}", step.line), words::seconds);
-                vec![when.into(), RichText::arcsec(step.size_arcsec, 4), step.pitches.to_string().into()]
-            };
-            let header = ["When", "Size", "Tooth pitches"];
-            blocks.extend(limited("Steps of whole teeth", &header, &recording.tooth_steps, row));
-        }
         let note = |note: &String| PageBlock::paragraph(format!("{}.", words::begun(note.trim_end_matches('.'))));
         blocks.extend(recording.notes.iter().map(note));
         let range = |values: Option<&Vec<f64>>| {
@@ -617,7 +602,6 @@ mod tests {
             rows: 6000,
             sessions: vec![session(0.0), session(1000.0)],
             faults,
-            tooth_steps: Vec::new(),
             notes: Vec::new(),
             unusable: None,
         }

@@ -100,10 +100,13 @@ fn fault(
 
 /// An index that an encoder lost so long after a session began: the error has another zero from there on.
 pub fn index_step(session: usize, since_s: f64) -> Law {
-    fault((FaultName::EncoderIndexJump, session, since_s), move |on, k| {
+    let mut law = fault((FaultName::EncoderIndexJump, session, since_s), move |on, k| {
         let Range { start, end } = on.rows.sessions[session];
         f64::from(u8::from(k >= start && (k >= end || on.rows.since[k] >= since_s)))
-    })
+    });
+    // Where each session has a zero of its own, no other shows it.
+    law.wrong.foretells = false;
+    law
 }
 
 /// A line at any order of an angle or of time: `per` is what it is counted against.

@@ -475,7 +475,7 @@ impl Law {
     /// the drive.
     #[must_use]
     pub(crate) const fn is_zero_of_sessions(&self) -> bool {
-        !self.wrong.foretells
+        !self.wrong.foretells && !matches!(self.label, Label::Fault { .. })
     }
     /// Whether it is told of the data, and says nothing of the drive.
     pub(crate) const fn is_of_the_data(&self) -> bool {

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::resolution::lattice;
-use super::steps::WHOLE_PITCH;
 use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, straight, whole_pitches};
 use crate::measurement::Refusal;
 use crate::measurement::columns::Quantity;
@@ -24,6 +23,10 @@ const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
 /// An output that dwells for longer than this, rad, has been frozen: clearance and as much of wind-up are shorter.
 /// *Guess*.
 const LONG_DWELL_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
+
+/// A change is that many whole tooth pitches if it differs by less than this share of one. *Guess*: pitch errors of fine
+/// gears are a third of that.
+const WHOLE_PITCH: f64 = 0.01;
 
 /// Length of a stretch that chance does not give in this many rows, of a channel that changes at every second row at
 /// least.

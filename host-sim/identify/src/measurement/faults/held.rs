@@ -14,8 +14,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use super::resolution::lattice;
-use super::steps::largest_torque;
-use super::{Findings, marked, rhythm, straight};
+use super::{Findings, largest_torque, marked, rhythm, straight};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;

@@ -40,13 +40,13 @@ pub(super) mod reads;
 pub(super) mod resolution;
 pub(super) mod stalls;
 mod state;
-pub(super) mod steps;
 pub(super) mod units;
 
 use std::ops::Range;
 
-use super::fault::{Fault, FaultName, ToothStep, Treatment};
+use super::fault::{Fault, FaultName, Treatment};
 use super::gear::Gear;
+use super::log::Log;
 use super::{Quantity, Session};
 use flexspline_base::robust::median_of;
 
@@ -60,7 +60,6 @@ const WIDEST_CLEARANCE_RAD: f64 = 600.0 * ARCSEC;
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     pub faults: Vec<Fault>,
-    pub tooth_steps: Vec<ToothStep>,
     pub notes: Vec<String>,
     /// Whether the time is refused because it looks like milliseconds.
     pub milliseconds: bool,
@@ -122,6 +121,11 @@ fn add_steps(values: &mut [f64], steps: &[(usize, f64)], scale: f64) {
     }
 }
 
+/// Largest torque of either sign, N·m; 0 where none was recorded.
+fn largest_torque(log: &Log) -> f64 {
+    farthest(log.of(Quantity::Torque).iter().copied()).abs()
+}
+
 /// The value that is farthest from zero; 0 of none.
 fn farthest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |a, b| if b.abs() > a.abs() { b } else { a })
@@ -162,7 +166,7 @@ impl LineFit {
 
 /// The tooth pitches that an angle at the output is, if it is a whole number of them but for this share of a pitch, or
 /// this angle.
-fn whole_pitches(angle_rad: f64, gear: &Gear, share: f64, but_rad: f64) -> Option<f64> {
+pub(crate) fn whole_pitches(angle_rad: f64, gear: &Gear, share: f64, but_rad: f64) -> Option<f64> {
     let pitch = gear.tooth_pitch_rad?;
     let pitches = (angle_rad / pitch).round();
     (pitches != 0.0 && (angle_rad - pitches * pitch).abs() < but_rad.max(share * pitch)).then_some(pitches)

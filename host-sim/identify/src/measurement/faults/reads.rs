@@ -247,9 +247,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         // Waves of the drive that fast rows are too far apart to follow scatter as well: what shows has to show without
         // what its state explains, too.
         if without_state {
-            let state = StateModel::new(log, gear);
-            let Some(fit) = state.fit(&[]) else { break };
-            reads.error = Cow::Owned(state.left(&fit, &[]));
+            let Some(left) = StateModel::new(log, gear).left() else { break };
+            reads.error = Cow::Owned(left);
         }
         late = late_rows(&mut reads, fast, gear);
         by_speed = Jitter::by_speed(&reads, fast)
