@@ -219,7 +219,7 @@ impl Sleeve {
         let kind = self.kind.name();
         let zero = format!(", allowed with kind = \"{kind}\": 0 (the shells hold the rim sideways)");
         misfits.require(!is_stiff, LATERAL, zero);
-        if self.has_bottom() && self.bottom == Bottom::Plate {
+        if self.has_bottom() && self.bottom == Bottom::Plate && self.bottom_side_mm >= shortest {
             let thickest = (self.bottom_side_mm - shortest).min(0.2 * radius_mm);
             let allowed = format!(", allowed: up to {thickest:.4} (a plate inside the end of the tube)");
             misfits.require(self.bottom_thickness_mm <= thickest, "sleeve.bottom_thickness_mm", allowed);
