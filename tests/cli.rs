@@ -288,18 +288,6 @@ fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
 }
 
 #[test]
-fn the_drive_that_is_printed_reads_back_as_itself() {
-    let desk = Desk::new();
-    let typical = desk.line("drive --drive HHD-95-typical --set generator.w0_mm=0.49").done().stdout;
-    assert!(typical.contains("w0_mm = 0.49") && typical.contains("# "));
-    desk.write("mine.toml", &typical);
-    assert_eq!(desk.line("drive --drive mine.toml").done().stdout, typical);
-    let hash = |line: &str| desk.line(line).done().json()["drive_hash"].as_str().unwrap().to_owned();
-    assert_ne!(hash("drive --json"), hash("drive --drive mine.toml --json"));
-    assert_eq!(hash("drive --json"), hash("drive --drive HHD-95 --json"));
-}
-
-#[test]
 fn a_drive_whose_teeth_interfere_ends_with_1_and_says_where() {
     let desk = Desk::new();
     let sound = desk.line("drive --check --json").done().json();
