@@ -4,8 +4,7 @@ use flexspline_tests::command::Desk;
 
 /// A size of a catalogue whose teeth, as the proportions of HHD-95 have them, clear one another when rigid and clash
 /// under the rated load in a cup and on balls. `new` says so, lowers the tips, and what it makes runs clean; with the
-/// tips as drawn `simulate` reports first of all where they
-/// bear.
+/// tips as drawn `simulate` reports first of all where they bear.
 #[test]
 #[ignore = "long: tests/run slow"]
 fn what_new_proposes_runs_without_tips_that_clash() {

@@ -226,8 +226,7 @@ mod tests {
         assert_eq!(line(10, 40, "turning", 20), "cam 10/40, turning: 20 s so far, about 60 s left");
     }
 
-    /// Seconds, parts done and expected of `tables` on two cores that other work shared: parts of one generator take
-    /// three times as long as those of another, and it shows only later how many there are.
+    /// Seconds, parts done and expected of `tables` with other work beside it; parts differ by generator, threefold.
     #[test]
     fn what_is_left_never_grows_by_more_than_a_fifth() {
         let seconds = [31.3, 32.4, 32.4, 42.5, 48.1, 68.2, 94.9, 95.1, 114.1, 134.2];
