@@ -563,8 +563,7 @@ impl<'a> RunState<'a> {
         let state = motion.state();
         let peak = peak_stress(motion.problem(), state);
         let zones = zones(motion.problem(), state);
-        let tips =
-            TipContact::of(&zones, self.drive.flexspline.module_mm).filter(|_| self.exceeds_drag(state.torque_n_m));
+        let tips = TipContact::of(&zones, &self.drive.flexspline).filter(|_| self.exceeds_drag(state.torque_n_m));
         let pressure_mpa = increment.peak_pressure_mpa[0];
         if pressure_mpa > self.zones.0 {
             self.zones = (pressure_mpa, zones);

@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use serde::Serialize;
 
 use flexspline_mechanics::contact::{BearingPlace, Configuration, FlankLaw};
-use flexspline_mechanics::drive::{Profile, Side};
+use flexspline_mechanics::drive::{Flexspline, Profile, Side};
 use flexspline_mechanics::stepping::{Problem, State};
 
 /// Pairs that are nearer than this are looked at, mm. A guess: a pair that bears has no gap.
@@ -150,9 +150,7 @@ fn pairs(problem: &Problem, state: &State) -> Vec<BearingPair> {
 impl TipContact {
     /// Contact of tips in a state that has all nodes near the flanks.
     pub fn at(problem: &Problem, state: &State) -> Option<TipContact> {
-        let flexspline = &problem.drive.flexspline;
-        let tips = TipContact::of(&zones(problem, state), flexspline.module_mm)?;
-        Some(if flexspline.profile == Profile::S { TipContact { relief_step_mm: 0.0, ..tips } } else { tips })
+        TipContact::of(&zones(problem, state), &problem.drive.flexspline)
     }
 
     /// The worst of some states: the one with the largest pressure on tips.
@@ -175,7 +173,7 @@ impl TipContact {
             self.at_deg.abs(),
             100.0 * self.share,
             match self.relief_step_mm {
-                0.0 => "lower flexspline tips do not help S-shaped teeth, whose spaces they cut; higher \
+                0.0 => "lower tips of the flexspline do not help S-shaped teeth, whose spaces they cut; higher \
                         circular_spline.tip_radius_mm and tip_rounding_mm ease it; of involutes `new` lowers the tips"
                     .to_owned(),
                 step_mm => format!("lower flexspline.tip_radius_mm, {step_mm:.3} mm at a time, until none bears"),
@@ -183,9 +181,9 @@ impl TipContact {
         )
     }
 
-    /// Of the zones of a state of a drive with this module: those beside the main ones that bear on tips for the most
-    /// part.
-    pub fn of(zones: &[Zone], module_mm: f64) -> Option<TipContact> {
+    /// Of the zones of a state of a drive with this flexspline: those beside the main ones that bear on tips for the
+    /// most part.
+    pub fn of(zones: &[Zone], flexspline: &Flexspline) -> Option<TipContact> {
         let outside = || zones.iter().filter(|zone| !zone.is_main && zone.on_tips > 0.5);
         let main = || zones.iter().filter(|zone| zone.is_main);
         let worst = outside().max_by(|a, b| a.peak_mpa.total_cmp(&b.peak_mpa))?;
@@ -196,7 +194,7 @@ impl TipContact {
             largest_n: most(|zone| zone.largest_n),
             peak_mpa: most(|zone| zone.peak_mpa),
             reach_mm: outside().map(|zone| zone.reach_mm).fold(0.0, f64::max),
-            relief_step_mm: RELIEF_MODULES * module_mm,
+            relief_step_mm: if flexspline.profile == Profile::S { 0.0 } else { RELIEF_MODULES * flexspline.module_mm },
         })
     }
 }
@@ -204,6 +202,7 @@ impl TipContact {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flexspline_mechanics::drive::Drive;
 
     fn zone(is_main: bool, share: f64, on_tips: f64, at_deg: f64) -> Zone {
         let side = Side::Minus;
@@ -217,12 +216,14 @@ mod tests {
     #[test]
     fn tips_outside_the_main_zone_clash_and_flanks_do_not() {
         let [main, flanks] = [zone(true, 0.9, 0.6, 0.0), zone(false, 0.1, 0.2, 30.0)];
-        assert_eq!(TipContact::of(&[main, flanks], 0.5), None);
-        let tips = TipContact::of(&[main, zone(false, 0.1, 1.0, -52.0)], 0.5).unwrap();
+        let [involute, s_shaped] = ["HHD-95", "S-95"].map(|name| Drive::built_in(name).unwrap().flexspline);
+        assert_eq!(TipContact::of(&[main, flanks], &involute), None);
+        let zones = [main, zone(false, 0.1, 1.0, -52.0)];
+        let tips = TipContact::of(&zones, &involute).unwrap();
         assert!((tips.at_deg + 51.0).abs() < 1e-9 && tips.share == 0.1 && tips.counts(), "{tips:?}");
         assert_eq!(tips.peak_mpa, [1e4, 6e3]);
         assert!(tips.in_words().contains("tips bear on one another 51 deg") && tips.in_words().contains("0.050 mm"));
-        let s_shaped = TipContact { relief_step_mm: 0.0, ..tips }.in_words();
+        let s_shaped = TipContact::of(&zones, &s_shaped).unwrap().in_words();
         assert!(s_shaped.contains("S-shaped teeth, whose spaces they cut") && !s_shaped.contains("until none bears"));
         assert!(!TipContact { share: 0.5 * MOST_TIP_SHARE, ..tips }.counts());
     }
