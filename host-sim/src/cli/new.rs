@@ -273,9 +273,12 @@ impl New {
     fn more(&self, written: &NewReport) -> String {
         let mut lines: Vec<String> = written.caution.iter().map(|of| format!("caution: {}", of.words)).collect();
         lines.extend(written.teeth.iter().map(Clearance::text));
-        lines.extend(
-            written.clears_with.iter().map(|set| format!("caution: the teeth bind; they clear with --set {set}")),
-        );
+        let binds = written.teeth.as_ref().is_some_and(|teeth| !teeth.clear.contains(&self.generator));
+        let none = "up to 3.5 lets them clear; those of the same drive without --set clear";
+        lines.extend(binds.then(|| match &written.clears_with {
+            Some(set) => format!("caution: the teeth bind; they clear with --set {set}"),
+            None => format!("caution: the teeth bind, and no circular_spline.profile_shift {none}"),
+        }));
         lines.extend(written.under_load.iter().map(UnderLoad::text));
         match (&self.like, &written.data_sheet) {
             (Some(_), Some(sheet)) => {
