@@ -34,8 +34,8 @@ const GUESSED: &str = "a guess in proportion to the pitch diameter: no catalogue
 /// Above `output.contact_compliance`.
 const CONTACT: &str = "what all sizes of a catalogue have in addition to teeth, cup and balls: a regularity with a \
                        form that Hertz gives, not a derivation; exponent and ratio power were chosen; 5.8 fitted on \
-                       sizes 17 to 40, i = 50 and 80, unseen 45 to 90 within 14 %; at i = 160 K1 is 25 % too stiff, \
-                       size 14 is 20 to 40 % off";
+                       sizes 17 to 40, i = 50 and 80, unseen 45 to 90 within 16 %; at i = 160 K1 is 21 to 28 % too \
+                       stiff, sizes 11 and 14 are up to 46 % off";
 /// Tip roundings of S-shaped teeth, modules, as of S-95.
 const S_TIP_ROUNDING: f64 = 0.1;
 

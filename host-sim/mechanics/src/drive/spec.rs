@@ -472,7 +472,7 @@ impl Drive {
     }
 
     /// `κ` of [`Drive::contact_wind_up_rad`] that catalogues have: fitted on K1 to K3 of Harmonic Drive sizes 17 to 40
-    /// at i = 50 and 80 beside FEM with cup and balls, and within 14 % of the unseen sizes 45 to 90.
+    /// at i = 50 and 80 beside FEM with cup and balls, and within 16 % of the unseen sizes 45 to 90.
     pub const CATALOGUE_CONTACT: f64 = 5.8;
 
     /// Wind-up of the output, in the sense of a load (N·m), that is in no model and in every catalogue, rad:
