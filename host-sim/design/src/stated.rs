@@ -15,8 +15,9 @@
 //! are computed for the sake of a stated one alone: the width of the hysteresis loop, whether the drive holds the
 //! ratcheting torque, and the torque that starts the generator.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use crate::catalogue::UNIT_SCATTER_PERCENT;
 use crate::cautions::Caution;
 use crate::data_sheet::{DataSheet, Loads, data_sheet};
 use flexspline_base::toml_file::{Allowed, TomlFile, above, from, real, text, yes_or_no};
@@ -40,23 +41,26 @@ const HALVINGS: usize = 3;
 /// Steps over a tooth pitch in which the generator is turned to find the torque that starts it.
 const STARTING_STEPS: usize = 6;
 
-/// Every key of `[data_sheet]`.
-pub(crate) const KEYS: [&str; 14] = [
-    "source",
-    "rated_torque_n_m",
-    "t1_n_m",
-    "t2_n_m",
-    "k1_n_m_per_rad",
-    "k2_n_m_per_rad",
-    "k3_n_m_per_rad",
-    "hysteresis_loss_arcmin",
-    "lost_motion_arcmin",
-    "ratcheting_torque_n_m",
-    "starting_torque_n_m",
-    "accuracy_arcmin",
-    "unit_scatter_percent",
-    "completes_model",
+/// The numbers of `[data_sheet]`, in their order: between its source and whether it completes the model.
+const NUMBERS: [(&str, Allowed); 12] = [
+    ("rated_torque_n_m", TORQUE),
+    ("t1_n_m", TORQUE),
+    ("t2_n_m", TORQUE),
+    ("k1_n_m_per_rad", STIFFNESS),
+    ("k2_n_m_per_rad", STIFFNESS),
+    ("k3_n_m_per_rad", STIFFNESS),
+    ("hysteresis_loss_arcmin", ARCMIN),
+    ("lost_motion_arcmin", ARCMIN),
+    ("ratcheting_torque_n_m", TORQUE),
+    ("starting_torque_n_m", TORQUE),
+    ("accuracy_arcmin", ARCMIN),
+    ("unit_scatter_percent", PERCENT),
 ];
+
+/// Every key of `[data_sheet]`.
+fn keys() -> impl Iterator<Item = &'static str> {
+    ["source"].into_iter().chain(NUMBERS.map(|(key, _)| key)).chain(["completes_model"])
+}
 
 /// The section as a comment, for files to be filled in.
 pub const TEMPLATE: &str = "
@@ -79,7 +83,7 @@ pub const TEMPLATE: &str = "
 ";
 
 /// Values of a data sheet.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stated {
     /// Which sheet.
     pub source: Option<String>,
@@ -130,39 +134,28 @@ impl Stated {
     /// The section as a drive file has it; what is not stated is a comment, to be filled in.
     pub fn to_toml(&self) -> String {
         let stated = serde_json::json!(self);
-        let line = |key: &&str| match &stated[*key] {
+        let line = |key: &str| match &stated[key] {
             serde_json::Value::Null => format!("# {key} = \n"),
             // Numbers and texts are written as in TOML.
             value => format!("{key} = {value}\n"),
         };
         let head = "\n[data_sheet]  # what a catalogue prints; simulate and tables show what is computed beside it; \
                     any line may be left out\n";
-        head.to_owned() + &KEYS.iter().map(line).collect::<String>()
+        head.to_owned() + &keys().map(line).collect::<String>()
     }
 
     fn read(file: &mut TomlFile<'_>, table: &toml::de::DeTable<'_>) -> Option<Stated> {
         let section = file.section(table, "data_sheet")?;
-        let known: Vec<String> = KEYS.iter().map(|key| section.path(key)).collect();
+        let known: Vec<String> = keys().map(|key| section.path(key)).collect();
         let others: Vec<&str> =
             table.keys().map(|key| key.get_ref().as_ref()).filter(|key| *key != "data_sheet").collect();
         file.refuse_unknown_keys(table, &known.iter().map(String::as_str).collect::<Vec<_>>(), &others);
-        let mut number = |key: &str, allowed: &Allowed| section.given(file, key, |value| real(allowed, value));
-        let mut stated = Stated {
-            source: None,
-            rated_torque_n_m: number("rated_torque_n_m", &TORQUE),
-            t1_n_m: number("t1_n_m", &TORQUE),
-            t2_n_m: number("t2_n_m", &TORQUE),
-            k1_n_m_per_rad: number("k1_n_m_per_rad", &STIFFNESS),
-            k2_n_m_per_rad: number("k2_n_m_per_rad", &STIFFNESS),
-            k3_n_m_per_rad: number("k3_n_m_per_rad", &STIFFNESS),
-            hysteresis_loss_arcmin: number("hysteresis_loss_arcmin", &ARCMIN),
-            lost_motion_arcmin: number("lost_motion_arcmin", &ARCMIN),
-            ratcheting_torque_n_m: number("ratcheting_torque_n_m", &TORQUE),
-            starting_torque_n_m: number("starting_torque_n_m", &TORQUE),
-            accuracy_arcmin: number("accuracy_arcmin", &ARCMIN),
-            unit_scatter_percent: number("unit_scatter_percent", &PERCENT),
-            completes_model: None,
-        };
+        let mut numbers = serde_json::Map::new();
+        for (key, allowed) in NUMBERS {
+            numbers
+                .extend(section.given(file, key, |value| real(&allowed, value)).map(|of| (key.to_owned(), of.into())));
+        }
+        let mut stated: Stated = serde_json::from_value(numbers.into()).ok()?;
         stated.source = section.given(file, "source", text);
         stated.completes_model = section.given(file, "completes_model", yes_or_no);
         // The rated torque may be below T2, even T1: catalogues have it so at i = 50 (CSG-32-50, HFUC-90-50).
@@ -181,6 +174,17 @@ impl Stated {
     /// That a load is far beyond the rated one, or above the ratcheting torque of the sheet.
     pub fn load_caution(&self, drive: &Drive, kind: GeneratorKind, load_n_m: f64) -> Option<Caution> {
         Caution::of_load(load_n_m, Stated::rated_n_m(Some(self), drive, kind), self.ratcheting_torque_n_m)
+    }
+
+    /// How far units scatter, as the sheet has it or, where it is silent, the catalogue.
+    pub(crate) fn scatter_percent(&self) -> f64 {
+        self.unit_scatter_percent.unwrap_or(UNIT_SCATTER_PERCENT)
+    }
+
+    /// Takes what [`Caution::of_stiffness`] says away where a sheet has a stiffness, whose ratio says it better.
+    pub fn retain(sheet: Option<&Stated>, cautions: &mut Vec<Caution>) {
+        let stiffness = sheet.and_then(|of| of.k1_n_m_per_rad.or(of.k2_n_m_per_rad).or(of.k3_n_m_per_rad));
+        cautions.retain(|caution| stiffness.is_none() || caution.figure != "stiffness");
     }
 
     /// The loads of the sheet; what it does not say is in the usual proportion to what it says, or to `rated_n_m`.
@@ -238,8 +242,7 @@ pub struct Beside {
     pub computed: Option<f64>,
     /// Computed over stated; missing where either is missing or nothing is stated.
     pub ratio: Option<f64>,
-    /// Whether the ratio is within the scatter of units that the sheet states; missing where it states none of this
-    /// figure.
+    /// Whether the ratio is within the scatter of units; missing of a figure that has none.
     pub within_scatter: Option<bool>,
     /// Meaning of the computed figure, and what it leaves out.
     pub words: &'static str,
@@ -343,7 +346,7 @@ pub fn beside(
     let beside = figures
         .into_iter()
         .filter_map(|(figure, value, computed)| {
-            let scatter = stated.unit_scatter_percent.filter(|_| figure.starts_with('k'));
+            let scatter = figure.starts_with('k').then(|| stated.scatter_percent());
             let stated = value?;
             // A pitch is not a turn, and what bears all that was looked for may bear more.
             let compares = match figure {
@@ -463,14 +466,13 @@ impl SheetBeside {
         lines
     }
 
-    /// That stiffness is not that of the sheet's units, and what to do; nothing where it is within their scatter, or
-    /// where no scatter is stated.
+    /// That stiffness is not that of the sheet's units, and what to do; nothing where it is within their scatter.
     pub fn caution(&self) -> Option<Caution> {
         let off = || self.beside.iter().filter(|row| row.within_scatter == Some(false));
         let ratios = || off().filter_map(|row| row.ratio);
         let value = ratios().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()))?;
         let each = off().zip(ratios()).map(|(row, ratio)| format!("{} {ratio:.2}", row.in_words().0));
-        let percent = self.stated.unit_scatter_percent.unwrap_or(0.0);
+        let percent = self.stated.scatter_percent();
         let way_out = if ratios().all(|ratio| ratio > 1.0) {
             "; tables --complete-from-data-sheet adds what is missing"
         } else {
@@ -530,7 +532,7 @@ impl Beside {
 
     /// Meaning of the figure, whether it depends on assumed loads, and whether it is within the scatter of units.
     pub fn remark(&self, of: &SheetBeside) -> String {
-        let percent = of.stated.unit_scatter_percent.unwrap_or(0.0);
+        let percent = of.stated.scatter_percent();
         let (_, _, hangs_on, _) = described(self.figure);
         let assumed = if hangs_on.iter().any(|key| of.assumed.contains(key)) { "at assumed loads; " } else { "" };
         let scatter = match self.within_scatter {
@@ -562,7 +564,6 @@ mod tests {
         SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
     }
 
-    /// A sheet beside figures of a drive.
     fn shown(stated: Stated, beside: Vec<Beside>) -> SheetBeside {
         let (generator, loads, assumed) = (GeneratorKind::Cam, stated.loads(20.0), stated.assumed());
         SheetBeside { generator, stated, loads, assumed, sheet: DataSheet::default(), beside, why: None }
@@ -577,28 +578,22 @@ mod tests {
     #[test]
     fn a_sheet_is_read_and_every_mistake_has_its_line() {
         let read = |body: &str| Stated::of_file("d.toml", &format!("base = \"HHD-95\"\n[data_sheet]\n{body}\n"));
-        let stated =
-            read("t1_n_m = 7\nk1_n_m_per_rad = 16e3\nsource = \"CSF\"\nunit_scatter_percent = 30").unwrap().unwrap();
-        assert_eq!(
-            (stated.t1_n_m, stated.k1_n_m_per_rad, stated.unit_scatter_percent),
-            (Some(7.0), Some(16e3), Some(30.0))
-        );
+        let stated = read("t1_n_m = 7\nk1_n_m_per_rad = 16e3\nsource = \"CSF\"").unwrap().unwrap();
+        assert_eq!((stated.t1_n_m, stated.k1_n_m_per_rad), (Some(7.0), Some(16e3)));
         assert_eq!(Stated::of_file("d.toml", "base = \"HHD-95\""), Ok(None));
-        let refused = |body: &str| read(body).unwrap_err().to_string();
-        let error = refused("k1 = 5");
-        assert!(error.contains("d.toml:3") && error.contains("k1_n_m_per_rad"), "{error}");
-        let error = refused("k2_n_m_per_rad = -5");
-        assert!(
-            error.contains("d.toml:3") && error.contains("data_sheet.k2_n_m_per_rad") || error.contains("found -5"),
-            "{error}"
-        );
-        let error = refused("t1_n_m = 25\nt2_n_m = 7");
-        assert!(error.contains("found t1 25.0 and t2 7.0, allowed: t1 below t2"), "{error}");
+        for (body, place, words) in [
+            ("k1 = 5", "d.toml:3", "k1_n_m_per_rad"),
+            ("k2_n_m_per_rad = -5", "d.toml:3", "found -5"),
+            ("t1_n_m = 25\nt2_n_m = 7", "", "found t1 25.0 and t2 7.0, allowed: t1 below t2"),
+        ] {
+            let error = read(body).unwrap_err().to_string();
+            assert!(error.contains(place) && error.contains(words), "{error}");
+        }
     }
 
     #[test]
     fn the_template_has_every_key_and_reads_once_it_is_filled_in() {
-        assert!(KEYS.iter().all(|key| TEMPLATE.contains(&format!("# {key} = "))));
+        assert!(keys().all(|key| TEMPLATE.contains(&format!("# {key} = "))));
         let filled = TEMPLATE.replace("\n# ", "\n").replace(" = 0.0", " = 5.0").replace("t1_n_m = 5.0", "t1_n_m = 1.0");
         let filled = filled.replace("t2_n_m = 5.0", "t2_n_m = 2.0");
         assert_eq!(Stated::of_file("d.toml", &filled).unwrap().unwrap().t2_n_m, Some(2.0));
@@ -651,9 +646,8 @@ mod tests {
     #[test]
     fn stiffness_beyond_what_units_scatter_is_a_caution() {
         let caution = |k1: f64, k2: f64| {
-            let stated = Stated { unit_scatter_percent: Some(30.0), ..Stated::default() };
             let rows = [("k1_n_m_per_rad", k1), ("k2_n_m_per_rad", k2)];
-            shown(stated, rows.map(|(figure, ratio)| row(figure, 1e4, Some(ratio))).to_vec()).caution()
+            shown(Stated::default(), rows.map(|(figure, ratio)| row(figure, 1e4, Some(ratio))).to_vec()).caution()
         };
         assert_eq!(caution(1.2, 0.8), None);
         let stiff = caution(7.7, 1.2).unwrap();
@@ -662,6 +656,12 @@ mod tests {
         // Softer is further off here, and no sheet completes it.
         let soft = caution(1.5, 0.2).unwrap();
         assert!(soft.value == 0.2 && soft.words.contains("K1 1.50, K2 0.20") && !soft.words.contains("--complete"));
+        let retained = |sheet: Stated| {
+            let mut cautions = Vec::from_iter(Caution::of_stiffness(&Drive::hhd_95()));
+            Stated::retain(Some(&sheet), &mut cautions);
+            cautions.len()
+        };
+        assert_eq!([None, Some(3e4)].map(|k2| retained(Stated { k2_n_m_per_rad: k2, ..Stated::default() })), [1, 0]);
     }
 
     /// CSG-32-50 is rated at 99 N·m, and its T2 is 108 N·m. A rated torque of T2 leaves nothing for K3 either.

@@ -17,7 +17,7 @@ use flexspline_design::simulate::{
     Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings, Summary,
     read_path, simulate, stress_by_place,
 };
-use flexspline_design::stated::{SheetBeside, beside};
+use flexspline_design::stated::{SheetBeside, Stated, beside};
 use flexspline_export::{VtuFrame, write_pvd, write_vtu};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -193,7 +193,7 @@ impl Simulate {
             summary.wind_up_parts = parts.unwrap_or_default();
         }
         let sheet = simulation.summary.data_sheet.as_ref();
-        simulation.summary.cautions.retain(|caution| sheet.is_none() || caution.figure != "stiffness");
+        Stated::retain(sheet.map(|sheet| &sheet.stated), &mut simulation.summary.cautions);
         let largest = simulation.rows.iter().map(|row| row.torque_n_m.abs()).fold(0.0, f64::max);
         simulation
             .summary

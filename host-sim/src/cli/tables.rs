@@ -177,7 +177,7 @@ impl Tables {
             });
         }
         for MadeTable { kind, info, .. } in &mut made {
-            info.cautions.retain(|caution| stated.is_none() || caution.figure != "stiffness");
+            Stated::retain(stated.as_ref(), &mut info.cautions);
             info.cautions.extend(beyond(*kind));
         }
         if let (Some(stated), None) = (&stated, &self.from_samples) {

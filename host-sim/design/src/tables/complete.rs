@@ -18,7 +18,6 @@ use flexspline::Table;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::catalogue::UNIT_SCATTER_PERCENT;
 use crate::data_sheet::{Loads, either_way_rad, torsion_rad, touch_n_m};
 use crate::stated::{Stated, short};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -126,7 +125,7 @@ impl SheetStiffness {
             t2_n_m,
             k_n_m_per_rad: [k1, k2, k3],
             // Whole percent are written into the image: rounded to the safe side.
-            scatter_percent: stated.unit_scatter_percent.unwrap_or(UNIT_SCATTER_PERCENT).ceil(),
+            scatter_percent: stated.scatter_percent().ceil(),
             loss_arcmin: stated.hysteresis_loss_arcmin,
         })
     }
