@@ -9,6 +9,7 @@ use super::context::quoted;
 use super::names::GeneratorNames;
 use super::{Context, Failure, report, say};
 use flexspline_base::output::Outputs;
+use flexspline_design::cautions::Caution;
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
 use flexspline_design::sweep::{
     Constraint, EXAMPLE, Judge, NUMBER, OfGenerator, PlanError, PlanSettings, Ran, ReducedSweep, RunStatus, Sense,
@@ -326,6 +327,9 @@ fn remarks(plan: &VariantPlan, sweep: &ReducedSweep) -> Vec<String> {
         if let Some(first) = sweep.rows.iter().find(|row| row.status == status) {
             remarks.push(format!("{count} runs {what}; the first, variant {}: {}", first.variant + 1, first.why));
         }
+    }
+    if !plan.is_of_tolerances() {
+        remarks.extend(Caution::of_stiffness(&plan.drive).map(|caution| caution.words));
     }
     let errors: Vec<&str> = plan.columns.iter().map(String::as_str).filter(|path| is_error_of_making(path)).collect();
     if !plan.is_of_tolerances() && !errors.is_empty() {
