@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use super::complete::SlipSpring;
 use super::info::MadeTable;
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -16,24 +15,27 @@ pub fn rust_source(table: &MadeTable) -> String {
     let _ = writeln!(text, "pub static {name}_TABLE: [u8; {}] = [", table.image.len());
     put_bytes(&mut text, &table.image);
     text.push_str("];\n");
-    if let [_, ..] = slip_of(table) {
-        let _ = writeln!(
-            text,
+    let list = |springs: usize| {
+        format!(
             "\n/// Springs that slip, for the loss of the data sheet: width in N m and gain in rad/(N m), for \
-             `flexspline_estimation::MaxwellSlip::of_torque`.\npub const {name}_SLIP: [(f32, f32); {}] = [",
-            slip_of(table).len()
-        );
-        slip_of(table).iter().for_each(|s| {
-            let _ = writeln!(text, "    ({:?}, {:?}),", s.width_n_m as f32, s.gain_rad_per_n_m as f32);
-        });
-        text.push_str("];\n");
-    }
+             `flexspline_estimation::MaxwellSlip::of_torque`.\npub const {name}_SLIP: [(f32, f32); {springs}] = [\n"
+        )
+    };
+    put_slip(&mut text, table, list, ["(", "", ")", "];\n"]);
     text
 }
 
-/// The springs that slip beside a table.
-fn slip_of(table: &MadeTable) -> &[SlipSpring] {
-    table.info.completed.as_ref().map_or(&[], |completed| &completed.slip)
+/// Puts the springs that slip beside a table, if there are any, as a list: what opens it, and what stands before,
+/// within, behind a pair and at the end.
+fn put_slip(text: &mut String, table: &MadeTable, list: impl Fn(usize) -> String, pair: [&str; 4]) {
+    let Some(completed) = table.info.completed.as_ref().filter(|completed| !completed.slip.is_empty()) else { return };
+    let [open, unit, close, end] = pair;
+    text.push_str(&list(completed.slip.len()));
+    for s in &completed.slip {
+        let [width, gain] = [s.width_n_m as f32, s.gain_rad_per_n_m as f32];
+        let _ = writeln!(text, "    {open}{width:?}{unit}, {gain:?}{unit}{close},");
+    }
+    text.push_str(end);
 }
 
 /// The image as a C header.
@@ -50,18 +52,13 @@ pub fn c_header(table: &MadeTable) -> String {
     let _ = writeln!(text, "static const uint8_t flexspline_{lower}_table[FLEXSPLINE_{name}_TABLE_BYTES] = {{");
     put_bytes(&mut text, &table.image);
     text.push_str("};\n");
-    if let [_, ..] = slip_of(table) {
-        let _ = writeln!(
-            text,
+    let list = |springs: usize| {
+        format!(
             "\n// Springs that slip, for the loss of the data sheet: width in N m and gain in rad/(N m), for \
-             flexspline_slip_set.\nstatic const float flexspline_{lower}_slip[{}][2] = {{",
-            slip_of(table).len()
-        );
-        slip_of(table).iter().for_each(|s| {
-            let _ = writeln!(text, "    {{{:?}f, {:?}f}},", s.width_n_m as f32, s.gain_rad_per_n_m as f32);
-        });
-        text.push_str("};\n");
-    }
+             flexspline_slip_set.\nstatic const float flexspline_{lower}_slip[{springs}][2] = {{\n"
+        )
+    };
+    put_slip(&mut text, table, list, ["{", "f", "}", "};\n"]);
     text.push_str("\n#endif\n");
     text
 }
