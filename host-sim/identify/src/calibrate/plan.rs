@@ -101,16 +101,14 @@ impl Bench {
             ("--travel-deg", &self.output_deg, any),
             ("--travel-deg (its length)", &length, [1.0, 3.6e4]),
         ];
-        let falls = within.iter().find_map(|(name, values, _)| {
-            let &[low, high] = *values else { return None };
-            let rises = low.is_finite() && high.is_finite() && low <= high;
-            (!rises).then(|| format!("{name}: found {low} and {high}, allowed: the lower first"))
-        });
-        falls.or_else(|| {
-            within.into_iter().find_map(|(name, values, [low, high])| {
-                let bad = values.iter().find(|value| !(low..=high).contains(*value))?;
-                Some(format!("{name}: found {bad}, allowed: {low} to {high}"))
-            })
+        within.into_iter().find_map(|(name, values, [low, high])| {
+            if let [from, to] = values
+                && !(from.is_finite() && to.is_finite() && from <= to)
+            {
+                return Some(format!("{name}: found {from} and {to}, allowed: the lower first"));
+            }
+            let bad = values.iter().find(|value| !(low..=high).contains(*value))?;
+            Some(format!("{name}: found {bad}, allowed: {low} to {high}"))
         })
     }
 
