@@ -382,12 +382,12 @@ class Table:
 
         With ``direction`` each row for itself, in steady motion that way; else in their order, from ``state`` or anywhere in the play.
         ``half_width_arcsec`` is that of the readings and of the table. A ``calibration`` gives it, and the hysteresis, which no table holds:
-        torques as the command ``replay`` finds them.
+        torques as the command ``replay`` finds them. A row for itself knows no loads before it: it has the half-width without hysteresis.
         """
         if calibration is not None and getattr(getattr(calibration, "table", None), "table_id", None) != self.table_id:
             raise BadInput(f"calibration: found {calibration!r}, allowed: what calibrate gave with this table, {self.table_id}")
         found = {} if calibration is None else calibration.json.get("torque_from_wind_up", {})
-        half_width_arcsec = found.get("half_width_arcsec", half_width_arcsec)
+        half_width_arcsec = found.get("half_width_arcsec" if direction is None else "half_width_alone_arcsec", half_width_arcsec)
         hysteresis = json.dumps(found["hysteresis"]) if "hysteresis" in found and direction is None else None
         reading = numbers("output_rad", output_rad)
         generator, half_width = spread(numbers("generator_rad", generator_rad), reading.size), numbers("half_width_arcsec", half_width_arcsec)
