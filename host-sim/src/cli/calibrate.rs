@@ -312,6 +312,9 @@ fn held(c: &Calibration) -> String {
             c.half_width_at_another_pace_arcsec
         );
     }
+    if c.has_delay() {
+        text += "; of both angles at one instant: the delay between the readings comes on top";
+    }
     text
 }
 

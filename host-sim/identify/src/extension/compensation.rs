@@ -92,6 +92,8 @@ impl Evaluation {
         if self.not_applied.iter().any(|cause| cause.reason == OF_THE_OUTPUT_ENCODER) {
             text += "; without the error of the output's encoder, which no table has and replay counts";
         }
+        let stay = self.not_applied.iter().filter(|cause| cause.reason != OF_THE_OUTPUT_ENCODER);
+        stay.for_each(|of| text += &format!("; with {}, which no table has: it stays", of.cause.as_str()));
         self.not_made.iter().for_each(|why| text += &format!("; {why}"));
         text
     }
