@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use flexspline::{GeneratorAngle, PlayState, Prediction, Table};
+use flexspline::{GeneratorAngle, PlayState, Prediction, Quality, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -19,7 +19,7 @@ use crate::misfit::{about_mean, explained};
 use crate::nominal::Nominal;
 use crate::wind_up::along;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_design::tables::generator_of;
+use flexspline_design::tables::{generator_of, was_recorded};
 
 /// A measured row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ pub struct ReplayedRow {
 pub struct ReplaySummary {
     /// Version of this object.
     pub schema_version: u32,
-    /// "in range", or "extrapolated" if any row lies outside the table.
+    /// "in range", or "extrapolated" if any row lies outside the table, or where it was not recorded.
     pub status: &'static str,
     /// Table.
     pub table_id: String,
@@ -162,6 +162,9 @@ impl RowsOf {
     }
 }
 
+/// Of rows where a table was not recorded.
+const ELSEWHERE: &str = "are in a part of the output's turn that the table was not recorded at: its error there, and \
+                         torques from the wind-up, are not known";
 /// Remark on rows whose owner is not stated.
 const OF_NOBODY: &str =
     "no file next to the rows names their drive and generator: whether the table is theirs was not checked";
@@ -240,7 +243,10 @@ pub fn read(
     let nominal = Nominal::of_table(table);
     let recording = parse_known(file, bytes, columns, &nominal, Some(table))?;
     let on_one = |recording| on_own_zeros(table, on_zero_of(table, recording), temperature_c);
-    rows_of(if on_zero { on_one(recording) } else { recording }, nominal.ratio, temperature_c)
+    let mut read = rows_of(if on_zero { on_one(recording) } else { recording }, nominal.ratio, temperature_c)?;
+    let elsewhere = read.rows.iter().filter(|row| !was_recorded(table, row.generator_rad)).count();
+    read.notes.extend((elsewhere > 0).then(|| format!("{elsewhere} rows {ELSEWHERE}")));
+    Ok(read)
 }
 
 /// A log of which sessions have zeros of their own, with what a table leaves in each about its zero.
@@ -258,14 +264,12 @@ pub(crate) fn on_own_zeros(table: &Table<'_>, mut log: Recording, temperature_c:
 
 /// The rows of a recording, if a table can be played over them.
 fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<RowsRead, MeasuredError> {
-    let refuse = |line: Option<u64>, what: String| MeasuredError { file: recording.file.clone(), line, what };
-    let in_other_unit = |fault: &&Fault| {
-        (fault.name, fault.channel, fault.treatment)
-            == (FaultName::UnitMismatch, Some(Quantity::Torque), Treatment::Masked)
-    };
+    let other_unit = (FaultName::UnitMismatch, Some(Quantity::Torque), Treatment::Masked);
+    let is_in_it = |fault: &&Fault| (fault.name, fault.channel, fault.treatment) == other_unit;
     // Without its torque the table would be read where the drive never was.
-    if let Some(fault) = recording.faults.iter().find(in_other_unit) {
-        return Err(refuse(Some(fault.first_line), fault.what.clone()));
+    if let Some(fault) = recording.faults.iter().find(is_in_it) {
+        let (file, line) = (recording.file.clone(), Some(fault.first_line));
+        return Err(MeasuredError { file, line, what: fault.what.clone() });
     }
     let said = check_ratio_of(&recording, ratio, MOST_ERROR_RAD)?;
     recording.notes.extend(said);
@@ -314,7 +318,10 @@ pub fn replay(
 ) -> (Vec<ReplayedRow>, ReplaySummary) {
     let mut by_quality = [0; 4];
     let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
-    let said: Vec<Prediction> = by_core(table, states).collect();
+    let mut said: Vec<Prediction> = by_core(table, states).collect();
+    for (said, _) in said.iter_mut().zip(rows).filter(|(_, row)| !was_recorded(table, row.generator_rad)) {
+        said.quality = said.quality.max(Quality::Extrapolated);
+    }
     let predicted = said.iter().map(|said| f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD);
     let measured: Vec<f64> = rows.iter().map(|row| row.error_arcsec).collect();
     let residuals: Vec<f64> =
@@ -385,7 +392,9 @@ fn torques_read(
     };
     let hysteresis = calibrated.and_then(|calibrated| calibrated.hysteresis).unwrap_or_default();
     along(table, rows, &hysteresis, |curve, row, error_rad| {
-        curve.read(row.generator_rad, error_rad, row.temperature_c, half_width_arcsec / ARCSEC_PER_RAD)
+        let half_rad = half_width_arcsec / ARCSEC_PER_RAD;
+        let [of_row @ .., _] = curve.next([row.generator_rad, error_rad, row.temperature_c, half_rad, f64::NAN]);
+        of_row
     })
 }
 

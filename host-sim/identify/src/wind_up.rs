@@ -11,7 +11,7 @@
 //! leaps, inside a dead zone, the torque is known to its ends, and no better than beside.
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Table};
-use flexspline_design::tables::SlipSpring;
+use flexspline_design::tables::{SlipSpring, was_recorded};
 use serde::{Deserialize, Serialize};
 
 use crate::replay::{MeasuredRow, by_core, has_torque};
@@ -128,15 +128,10 @@ impl<'t> WindUpCurve<'t> {
     }
 
     /// Torque of the next reading with its least and its most, N·m, where the error (output less generator over ratio,
-    /// on the zero of the table) and what the table has are right to `half_width_rad`. The torque is within the table's
-    /// range; a least or a most that is beyond is infinite. NaN where a reading is not finite.
-    pub fn read(&mut self, generator_rad: f64, error_rad: f64, temperature_c: f64, half_width_rad: f64) -> [f64; 3] {
-        let [torque, low, high, _] = self.next([generator_rad, error_rad, temperature_c, half_width_rad, f64::NAN]);
-        [torque, low, high]
-    }
-
-    /// The same of a row, with the half width that its interval needs to hold the torque recorded, rad.
-    pub(crate) fn next(&mut self, [psi_rad, error_rad, temperature_c, half_rad, known_n_m]: [f64; 5]) -> [f64; 4] {
+    /// on the zero of the table) and what the table has are right to a half width, rad; of a row also the half width
+    /// that its interval needs to hold the torque recorded. The torque is within the table's range; a least or a most
+    /// that is beyond is infinite. NaN where a reading is not finite.
+    pub fn next(&mut self, [psi_rad, error_rad, temperature_c, half_rad, known_n_m]: [f64; 5]) -> [f64; 4] {
         let Some(generator) = GeneratorAngle::from_rad(psi_rad) else { return [f64::NAN; 4] };
         let steady = |torque_n_m: f64| {
             [Direction::Forward, Direction::Backward].map(|way| {
@@ -166,9 +161,10 @@ impl<'t> WindUpCurve<'t> {
         if !(torque + half + left + error_rad).is_finite() {
             return [f64::NAN; 4];
         }
-        // Of loads beyond its own a table says nothing: there an interval has no end.
-        let low = if low > least_n_m { low } else { f64::NEG_INFINITY };
-        let high = if high < most_n_m { high } else { f64::INFINITY };
+        // Of loads beyond its own, and where nothing was recorded, a table says nothing: an interval has no end.
+        let recorded = was_recorded(self.table, psi_rad);
+        let low = if recorded && low > least_n_m { low } else { f64::NEG_INFINITY };
+        let high = if recorded && high < most_n_m { high } else { f64::INFINITY };
         self.held.follow(torque, self.hysteresis.springs.iter().map(|spring| spring.width_n_m));
         let [below, above] = [-1.0, 1.0].map(|end| torque + end * self.held.half_width_n_m);
         [torque, low.min(below), high.max(above), needs]
@@ -176,7 +172,8 @@ impl<'t> WindUpCurve<'t> {
 }
 
 /// Reads the error of rows by a curve, each session from a state that is not known, on its zero of the output: the mean
-/// of what table and hysteresis leave under the torques recorded; without any, that of all rows.
+/// of what table and hysteresis leave under the torques recorded; without any, that of all rows. Rows where the table
+/// was not recorded say nothing of it, unless there are no others.
 pub(crate) fn along<R>(
     table: &Table<'_>,
     rows: &[MeasuredRow],
@@ -188,10 +185,12 @@ pub(crate) fn along<R>(
     for rows in rows.chunk_by(|row, next| !has_torque || row.session == next.session) {
         let mut held = HeldTorques::default();
         let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
-        let left = rows.iter().zip(by_core(table, states)).map(|(row, said)| {
+        let there = rows.iter().any(|row| was_recorded(table, row.generator_rad));
+        let left = rows.iter().zip(by_core(table, states)).filter_map(|(row, said)| {
             let lags = hysteresis.error_rad(&held, row.torque_n_m);
             held.follow(row.torque_n_m, hysteresis.springs.iter().map(|spring| spring.width_n_m));
-            row.error_arcsec / ARCSEC_PER_RAD - f64::from(said.transmission_error_rad) - lags
+            let left = row.error_arcsec / ARCSEC_PER_RAD - f64::from(said.transmission_error_rad) - lags;
+            (!there || was_recorded(table, row.generator_rad)).then_some(left)
         });
         let zero = mean(&left.collect::<Vec<f64>>());
         let mut curve = WindUpCurve::new(table, PlayState::unknown(), hysteresis.clone());

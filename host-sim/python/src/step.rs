@@ -303,8 +303,8 @@ impl Table {
         for_rows(py, rows, |row| put(row, Approach::From(&play)))
     }
 
-    /// Torques by wind-up. With `direction` each row for itself, in steady motion; else in row order from `state`,
-    /// which stays, and with the `hysteresis` of a calibration.
+    /// Torques by wind-up. With `direction` each row for itself, in steady motion, without `hysteresis`: what springs
+    /// hold is of the loads before. Else in row order from `state`, which stays.
     #[expect(clippy::too_many_arguments, reason = "each is a column")]
     fn torque(
         &self,
@@ -339,8 +339,8 @@ impl Table {
                 wind_up = WindUpCurve::new(table, CoreState::after_motion(sides.at(row)), Hysteresis::default());
             }
             let error = reading.at(row) - generator[row] / ratio;
-            [torque[row], low[row], high[row]] =
-                wind_up.read(generator[row], error, temperature.at(row), half_width.at(row));
+            [torque[row], low[row], high[row], _] =
+                wind_up.next([generator[row], error, temperature.at(row), half_width.at(row), f64::NAN]);
         })
     }
 

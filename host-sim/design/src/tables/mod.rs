@@ -22,7 +22,10 @@ pub use complete::{Completed, CompletionError, MissingSpring, SheetStiffness, Sl
 pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 pub use make::{MakeError, TableObserver, TableProgress, TableSettings, make};
 pub use positions::places_that_tell_apart;
-pub use project::{SampleOptions, TableError, core_drive, core_kind, empirical_percent, from_plan, from_samples};
+pub use project::{
+    PARTS_OF_A_TURN, SampleOptions, TableError, core_drive, core_kind, empirical_percent, from_plan, from_samples,
+    parts_between, was_recorded,
+};
 pub use source_files::put_bytes;
 pub use source_files::{c_header, rust_source};
 pub use sweep::{SweepProgress, TorqueSweepError};

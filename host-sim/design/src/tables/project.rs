@@ -148,6 +148,34 @@ pub fn empirical_percent(table: &Table<'_>) -> Option<f64> {
     percent.strip_suffix(" %")?.parse().ok()
 }
 
+/// Parts of the output's turn, each with rows or without. *Chosen*: six to the period of the highest wave of a
+/// calibration.
+pub const PARTS_OF_A_TURN: usize = 36;
+/// Angles this near to either side of a place, deg, show what is there. *Chosen*: a quarter of a period of that wave.
+const NEAR_DEG: usize = 15;
+
+/// The parts of the output's turn, a bit each, with some of these angles, rad, near to either side of the middle.
+pub fn parts_between(angles: impl Iterator<Item = f64>) -> u64 {
+    let mut there = [false; 360];
+    angles.for_each(|angle| there[(angle.to_degrees().rem_euclid(360.0) as usize).min(359)] = true);
+    let near = |from: usize| (from..from + NEAR_DEG).any(|degree| there[degree % 360]);
+    let middle = |part: usize| 360 + (2 * part + 1) * 180 / PARTS_OF_A_TURN;
+    let is_between = |part: &usize| near(middle(*part) - NEAR_DEG) && near(middle(*part));
+    (0..PARTS_OF_A_TURN).filter(is_between).fold(0, |parts, part| parts | 1 << part)
+}
+
+/// Before the number whose bits are the parts that [`was_recorded`] reads.
+const TURN_MARK: &str = ", turn ";
+
+/// Whether a table was recorded where the generator stands here: by what ends its mesh level, `, turn 0000003f0`, a bit
+/// for each part of the output's turn. A table that does not say was everywhere.
+pub fn was_recorded(table: &Table<'_>, generator_rad: f64) -> bool {
+    let turns = generator_rad / table.drive().exact_ratio() / std::f64::consts::TAU;
+    let part = (turns.rem_euclid(1.0) * PARTS_OF_A_TURN as f64) as usize % PARTS_OF_A_TURN;
+    let marked = table.mesh_level().split_once(TURN_MARK);
+    marked.and_then(|(_, parts)| u64::from_str_radix(parts, 16).ok()).is_none_or(|parts| parts >> part & 1 == 1)
+}
+
 /// A table of forward samples at positive torque `nodes` alone, for choosing nodes: the other quadrants are filled by
 /// mirror images that neglect the drag. Only its image is wanted.
 pub(super) fn trial_table(
@@ -246,17 +274,20 @@ pub fn from_samples(
     make((&drive.name, drive.hash()), kind, &plan, &snapped, source, SAMPLES, 0.0)
 }
 
-/// The table of samples of a model called `of`, laid out by a plan, of a drive that is known by name and hash alone.
+/// The table of samples of a model called `of`, laid out by a plan, of a drive that is known by name and hash alone,
+/// from rows in these [parts](was_recorded) of the output's turn; 0 where they are too few for that.
 pub fn from_plan(
     name: &str,
     hash: [u8; 32],
     kind: GeneratorKind,
     plan: &Plan<'_>,
     samples: &[Sample],
-    of: &str,
+    (of, recorded): (&str, u64),
 ) -> Result<MadeTable, TableError> {
     let source = Source::File { name: of.to_owned(), blake3: blake3::Hash::from(hash).to_hex().to_string() };
-    make((name, hash), kind, plan, samples, source, SAMPLES, 0.0)
+    let is_whole = recorded == 0 || recorded.trailing_ones() as usize >= PARTS_OF_A_TURN;
+    let mark = if is_whole { String::new() } else { format!("{TURN_MARK}{recorded:09x}") };
+    make((name, hash), kind, plan, samples, source, &(SAMPLES.to_owned() + &mark), 0.0)
 }
 
 fn make(
@@ -284,7 +315,7 @@ fn make(
         solver_residual: residual as f32,
         torque_range_n_m: span(plan.torque_nodes_n_m),
         temperature_range_c: match plan.temperature_nodes_c {
-            [one] if mesh == SAMPLES => [one - ONE_TEMPERATURE_K, one + ONE_TEMPERATURE_K],
+            [one] if mesh.starts_with(SAMPLES) => [one - ONE_TEMPERATURE_K, one + ONE_TEMPERATURE_K],
             nodes => span(nodes),
         },
         error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(flexspline::Table::MAX_ERROR_RAD)) as f32,

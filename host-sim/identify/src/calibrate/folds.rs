@@ -7,8 +7,9 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State, columns, weights};
+use super::parts::{PartName, Scales, State, columns, weights};
 use crate::linear::{Gram, Prior, solve};
+use flexspline_design::tables::PARTS_OF_A_TURN;
 
 /// A row to fit.
 #[derive(Debug, Clone, Copy, PartialEq)]

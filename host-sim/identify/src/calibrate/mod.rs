@@ -282,14 +282,6 @@ pub struct HeldOut {
     pub rms_after_arcsec: f64,
 }
 
-/// States spread over what the table of these rows is to hold.
-fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> Vec<State> {
-    let (from, to) = least_and_most(rows.rows.iter().map(|row| row.at.output_rad));
-    let pace = rows.rows.iter().map(|row| row.at.speed_rad_s.abs()).sum::<f64>() / rows.rows.len().max(1) as f64;
-    let states = interval::spread(&recorded.scales, prior.nominal.ratio, [from, to], ROWS_OF_A_WIDTH);
-    states.into_iter().map(|at| State { speed_rad_s: at.way * pace, ..at }).collect()
-}
-
 /// Wind-up and waves of the output, where the load goes with the output's angle, with the size that they may have,
 /// whichever a model has, arcsec: what was fitted may be the other's, all of it.
 fn collinear(rows: &Rows, model: &Model, correlation: f64) -> Vec<(PartName, f64)> {
@@ -298,19 +290,6 @@ fn collinear(rows: &Rows, model: &Model, correlation: f64) -> Vec<(PartName, f64
     let largest = fitted.map(|chosen| size(rows, model, *chosen)).fold(0.0, f64::max);
     let open = both.into_iter().filter(|_| correlation > TURNS_WITH_THE_OUTPUT);
     open.map(|part| (part, usual_arcsec(part, &model.scales).max(largest))).collect()
-}
-
-/// Says so where the load goes with the output's angle, and the rows tell neither alone as well as both together, to
-/// `as_recorded_arcsec`.
-fn load_with_angle(correlation: f64, wind_up_alone_arcsec: f64, as_recorded_arcsec: f64) -> Option<String> {
-    (wind_up_alone_arcsec > as_recorded_arcsec).then(|| {
-        format!(
-            "the load goes with the angle of the output (correlation {correlation:.2}), as the weight of an arm does: \
-             wind-up and waves of the output are one there, the wind-up alone is known to ±{wind_up_alone_arcsec:.0} \
-             arcsec, and under another load at the same angles the table, and a torque from the wind-up, are as far \
-             off; record the same angles under other loads"
-        )
-    })
 }
 
 /// `calibration.json`.
@@ -721,7 +700,6 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let Fitted { rows, folds, model, held_out, .. } = fitted;
     let torque_from_wind_up = WindUpTorque::of(&rows, &folds, &model, prior).filter(|_| recorded.has_torque);
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
-    let torque_from_wind_up = torque_from_wind_up.map(|of| of.over_all(files, &image, recorded.temperature_c));
     let core = ByCore::of(files, &image, recorded);
     let mut readings = delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
     let delay = delay_note(&readings, files.len());
@@ -751,15 +729,24 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let as_fitted = |at: State| if delays.is_some() { at_rest(at) } else { at };
     let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
     let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
-    let anywhere = anywhere(&rows, recorded, prior);
+    // Over what the table is to hold.
+    let (from, to) = least_and_most(rows.rows.iter().map(|row| row.at.output_rad));
+    let pace = rows.rows.iter().map(|row| row.at.speed_rad_s.abs()).sum::<f64>() / rows.rows.len().max(1) as f64;
+    let mut anywhere = interval::spread(&recorded.scales, prior.nominal.ratio, [from, to], ROWS_OF_A_WIDTH);
+    anywhere.iter_mut().for_each(|at| at.speed_rad_s = at.way * pace);
     let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
-    let of_wind_up = known.nodes().into_iter().filter(|node| node.part == PartName::WindUp.as_str());
-    let widest = of_wind_up.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
-    let wind_up_alone_arcsec = if beside.is_empty() { 0.0 } else { widest };
-    notes.extend(load_with_angle(correlation, wind_up_alone_arcsec, half_width_as_recorded_arcsec));
-    let torque_from_wind_up = torque_from_wind_up.map(|of| of.known_to(wind_up_alone_arcsec));
+    let beyond = (half_width_arcsec.powi(2) - half_width_as_recorded_arcsec.powi(2)).max(0.0).sqrt();
+    notes.extend((!beside.is_empty() && beyond > half_width_as_recorded_arcsec).then(|| {
+        format!(
+            "the load goes with the angle of the output (correlation {correlation:.2}), as the weight of an arm does: \
+             wind-up and waves of the output are one there, and under another load at the same angles the table, and \
+             a torque from the wind-up, are off by ±{half_width_arcsec:.0} arcsec; record them under other loads"
+        )
+    }));
+    let torque_from_wind_up =
+        torque_from_wind_up.map(|of| of.over_all(files, (&image, recorded.temperature_c), beyond));
     let offset = |(log, middle): (usize, &f64)| {
         let left: Vec<f64> = rows.rows.iter().filter(|row| row.at.log == log).map(zero).collect();
         let count = left.len().max(1) as f64;
@@ -1066,10 +1053,8 @@ fn remarks(
         ),
         (recorded.output_share < 1.0 && model.of(PartName::OutputAngle).is_some()).then(|| {
             format!(
-                "{:.0} % of an output turn was recorded: in the rest the curve over the output angle {}, and is not \
-                 measured",
-                100.0 * recorded.output_share,
-                if recorded.scales.unrecorded == 0 { "joins its ends" } else { "is held at zero" }
+                "{:.0} % of an output turn was recorded: elsewhere the curve over the output angle is not measured",
+                100.0 * recorded.output_share
             )
         }),
         said(

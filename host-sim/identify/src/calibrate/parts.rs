@@ -73,8 +73,6 @@ pub(super) const GENERATOR_ORDERS: u16 = 8;
 pub(super) const OUTPUT_ORDERS: u16 = 6;
 /// Waves of the curve over a tooth pitch: eight nodes of a table hold them.
 pub(super) const TOOTH_ORDERS: u16 = 3;
-/// Parts of the output's turn, each with rows or without. *Guess*: six to the period of the highest wave.
-pub(super) const PARTS_OF_A_TURN: usize = 36;
 /// Degree of the wind-up over the torques recorded.
 pub(super) const WIND_UP_DEGREE: usize = 6;
 /// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come

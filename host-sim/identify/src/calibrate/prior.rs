@@ -1,14 +1,17 @@
 //! Knowledge of a unit before it is measured: a nominal model, a table, or the ratio alone.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use flexspline::Table;
 
 use super::CalibrationError;
 use super::parts::{State, flank};
+use super::rows::Recorded;
 use super::zero::steady;
 use crate::extension::Model;
 use crate::nominal::{Nominal, Spread, USUAL_TEMPERATURE_C};
+use flexspline_design::tables::{PARTS_OF_A_TURN, was_recorded};
 use flexspline_mechanics::drive::{DriveError, GeneratorKind};
 
 /// Knowledge before a measurement.
@@ -106,6 +109,14 @@ impl<'a> Prior<'a> {
             return Ok(*table.drive());
         }
         self.nominal.core_drive().map_err(|error| CalibrationError::Known(error.to_string()))
+    }
+
+    /// Parts of the output's turn that rows were recorded at, and those of the logs that the table is of.
+    pub(super) fn parts(&self, recorded: &Recorded) -> u64 {
+        let of_logs = self.table.filter(|table| table.solver_residual() == 0.0);
+        let middle_rad = |part: usize| TAU * self.nominal.ratio * (part as f64 + 0.5) / PARTS_OF_A_TURN as f64;
+        let there = |part: &usize| of_logs.is_some_and(|table| was_recorded(table, middle_rad(*part) - self.zero_rad));
+        (0..PARTS_OF_A_TURN).filter(there).fold(recorded.parts, |parts, part| parts | 1 << part)
     }
 
     /// Tooth pitches of the fixed wheel in a turn of the generator.

@@ -4,12 +4,13 @@ use std::f64::consts::TAU;
 
 use super::Model;
 use super::folds::{Folds, Row};
-use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State, flank};
+use super::parts::{PartName, Scales, State, flank};
 use super::prior::Prior;
 use crate::least_squares::Normal;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
 use crate::residual::lasting_step;
 use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::{PARTS_OF_A_TURN, parts_between};
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
 const BLOCKS: usize = 8;
@@ -54,6 +55,8 @@ pub(super) struct Recorded {
     /// Shares of the turns of generator and output with rows in them.
     pub generator_share: f64,
     pub output_share: f64,
+    /// Parts of the output's turn between rows, a bit each.
+    pub parts: u64,
     pub generator_turns: f64,
     /// Of the way of the generator, there and back.
     pub backward_share: f64,
@@ -143,6 +146,7 @@ impl Recorded {
             has_temperature,
             generator_share: share_with_rows(without_rows(angles(1.0), 24), 24),
             output_share,
+            parts: parts_between(angles(1.0 / prior.nominal.ratio)),
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
             step_rad,

@@ -63,7 +63,7 @@ pub(super) fn make(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Res
             deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         };
         let samples = samples(prior, model, recorded.scales.teeth, torques, &temperatures);
-        from_plan(&prior.drive, prior.hash, prior.kind, &plan, &samples, "logs of one unit")
+        from_plan(&prior.drive, prior.hash, prior.kind, &plan, &samples, ("logs of one unit", prior.parts(recorded)))
     };
     let first = first_torque_nodes(prior, model, recorded);
     let jumps = jump_intervals(first.len(), |node| first[node]);

@@ -8,7 +8,9 @@ use super::*;
 use crate::extension::left_by_core;
 use crate::measurement::Session;
 use crate::nominal::Harmonic;
+use crate::replay::{ReplayedRow, measured_rows, replay};
 use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::was_recorded;
 use flexspline_mechanics::drive::GeneratorKind;
 
 const RATIO: f64 = 101.0;
@@ -62,7 +64,7 @@ fn where_nothing_was_recorded_a_table_adds_no_error() {
             log.sessions[0].leave_out(&beyond);
             let made = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
             assert!(kept(&made.calibration).contains(&"output_angle"), "{:#?}", made.calibration.parts);
-            let held = |note: &String| note.contains("the curve over the output angle is held at zero");
+            let held = |note: &String| note.contains("elsewhere the curve over the output angle");
             assert!(made.calibration.notes.iter().any(held), "{:?}", made.calibration.notes);
             // Mean squares by the core, less the zero of what was recorded: there, and in the rest.
             let once = |psi: &f64| psi / RATIO < std::f64::consts::TAU;
@@ -75,6 +77,8 @@ fn where_nothing_was_recorded_a_table_adds_no_error() {
                 [false, true].map(|rest| of(rest).map(|value| (value - zero).powi(2)).sum::<f64>() / count(rest))
             };
             let table = Table::check(&made.table.image).unwrap();
+            let in_parts = |psi: &f64| (psi / RATIO).to_degrees().rem_euclid(360.0) < 90.0;
+            assert!(whole.sessions[0].generator_rad.iter().all(|psi| was_recorded(&table, *psi) == in_parts(psi)));
             let left = left_by_core(&table, &whole.sessions[0], 20.0);
             let measured: Vec<f64> = whole.sessions[0].error_rad.iter().map(|rad| rad * ARCSEC_PER_RAD).collect();
             let said: Vec<f64> = measured.iter().zip(&left).map(|(measured, left)| measured - left).collect();
@@ -625,6 +629,30 @@ fn the_phase_of_a_table_is_found_from_a_log() {
     let rows = settled(&[flat], &Prior::of_table(&smooth, GeneratorKind::Cam), &by_ratio);
     let told = zero::align(&smooth, &rows, 0.6);
     assert!(!told.told, "{told:?}");
+}
+
+/// Torques by a table of a quarter of the output's turn: there most intervals hold them, in the rest none has an end
+/// and no row counts as in range.
+#[test]
+fn torques_are_not_known_where_a_part_of_the_turn_was_not_recorded() {
+    let law =
+        |psi: f64, out: f64, torque: f64, _: f64| 10.0 * (2.0 * psi).sin() + 60.0 * (out - 0.7).cos() + 3.0 * torque;
+    let [mut log, whole] = [1, 2].map(|seed| recording(seed, law));
+    let session = &mut log.sessions[0];
+    let beyond: Vec<bool> = session.generator_rad.iter().map(|psi| psi / RATIO > 1.6).collect();
+    session.leave_out(&beyond);
+    let made = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+    let table = Table::check(&made.table.image).unwrap();
+    let rows: Vec<_> = measured_rows(&whole.sessions, 20.0).collect();
+    let (replayed, summary) = replay(&table, &rows, made.calibration.torque_from_wind_up);
+    let ends = |row: &ReplayedRow| [row.torque_from_wind_up_low_n_m, row.torque_from_wind_up_high_n_m];
+    let (there, elsewhere): (Vec<_>, Vec<_>) = replayed.iter().partition(|row| was_recorded(&table, row.generator_rad));
+    let holds = |row: &&&ReplayedRow| ends(row)[0] <= row.torque_n_m && row.torque_n_m <= ends(row)[1];
+    let share = there.iter().filter(holds).count() as f64 / there.len() as f64;
+    let finite = there.iter().filter(|row| ends(row)[1].is_finite()).count();
+    assert!(share > 0.9 && finite > there.len() / 2, "{share} of {}, {finite}", there.len());
+    let open = |row: &&ReplayedRow| row.quality == "extrapolated" && ends(row) == [f64::NEG_INFINITY, f64::INFINITY];
+    assert!(elsewhere.len() > 2000 && elsewhere.iter().all(open) && summary.status == "extrapolated");
 }
 
 /// An arm in one posture, whose load is a wave of the output, with the error that an output angle and a load make,

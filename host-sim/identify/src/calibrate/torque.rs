@@ -45,7 +45,7 @@ pub struct WindUpTorque {
     /// Rows.
     pub rows: usize,
     /// Half width of the error that the intervals are of, arcsec: where 95 of 100 rows of the other folds lie, and of
-    /// all rows; no less than the wind-up is known to where the load goes with the angle of the output.
+    /// all rows, with what loads and angles add that were not recorded together.
     pub half_width_arcsec: f64,
     /// The same for who reads with the table alone, as the core does.
     #[serde(default)]
@@ -158,26 +158,20 @@ impl WindUpTorque {
     }
 
     /// With intervals wide enough for all rows as they are read by a table: those inside the play, and after a reversal
-    /// of the load, among them.
-    pub(super) fn over_all(self, files: &[Recording], table: &Table<'_>, temperature_c: f64) -> Self {
+    /// of the load, among them, and for what the table is off `beyond` that, arcsec, under loads and at angles that
+    /// were not recorded together.
+    pub(super) fn over_all(self, files: &[Recording], (table, temperature_c): (&Table<'_>, f64), beyond: f64) -> Self {
         let rows: Vec<_> = measured_rows(files.iter().flat_map(|file| &file.sessions), temperature_c).collect();
         let of_all = |hysteresis: &Hysteresis, half_arcsec: f64| {
             let half_rad = half_arcsec / ARCSEC_PER_RAD;
             let mut needs = along(table, &rows, hysteresis, |curve, row, error| {
                 curve.next([row.generator_rad, error, row.temperature_c, half_rad, row.torque_n_m])[3]
             });
-            half_arcsec.max(quantile_of(&mut needs, INSIDE) * ARCSEC_PER_RAD)
+            half_arcsec.max(quantile_of(&mut needs, INSIDE) * ARCSEC_PER_RAD).hypot(beyond)
         };
         let half_width_alone_arcsec = of_all(&Hysteresis::default(), self.half_width_alone_arcsec);
         let with = self.hysteresis.as_ref().map(|hysteresis| of_all(hysteresis, self.half_width_arcsec));
         Self { half_width_arcsec: with.unwrap_or(half_width_alone_arcsec), half_width_alone_arcsec, ..self }
-    }
-
-    /// No better than a wind-up that is known to this, whatever the rows say.
-    pub(super) fn known_to(self, arcsec: f64) -> Self {
-        let [half_width_arcsec, half_width_alone_arcsec] =
-            [self.half_width_arcsec, self.half_width_alone_arcsec].map(|half| half.max(arcsec));
-        Self { half_width_arcsec, half_width_alone_arcsec, ..self }
     }
 
     /// Of fits, each without the fold of its place. Springs go by torques found, by those recorded between flanks.

@@ -172,7 +172,7 @@ impl ExtendedTables<'_> {
             negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
             deviation_limit_rad: f64::from(flexspline::Table::MAX_ERROR_RAD),
         };
-        Ok(from_plan(&self.drive, self.hash, self.kind, &plan, &samples, of)?)
+        Ok(from_plan(&self.drive, self.hash, self.kind, &plan, &samples, (of, u64::MAX))?)
     }
 
     /// Steady motion both ways through a whole turn of the output at every node.
