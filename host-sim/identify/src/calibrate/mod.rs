@@ -99,9 +99,10 @@ const OTHER_RATIO: f64 = 0.25;
 const LEAST_OF_OTHER_RATIO_RAD: f64 = 0.0044;
 /// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
 pub(crate) const MOST_ERROR_RAD: f64 = 0.0175;
-/// A change of the error between two rows is a leap from this on, rad, and from this multiple of the usual one. *Guess*:
-/// fifteen arc-minutes, half a pitch of fine teeth, where clearance and wind-up are a few.
+/// A change of the error between two rows is a leap from this on, rad… *Guess*: fifteen arc-minutes, half a pitch of
+/// fine teeth, where clearance and wind-up are a few.
 const LEAP_RAD: f64 = 0.0044;
+/// …and from this multiple of the usual one. *Guess*: a wrong ratio changes the error evenly.
 const FAR_LARGER: f64 = 10.0;
 /// Arcsec that are taken for rounding.
 const ROUNDING_ARCSEC: f64 = 1e-6;

@@ -7,7 +7,7 @@ use super::folds::{Folds, Row};
 use super::parts::{PartName, Scales, State, flank};
 use super::prior::Prior;
 use crate::least_squares::Normal;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
+use crate::measurement::{HELD, Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
 use crate::residual::lasting_step;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{PARTS_OF_A_TURN, parts_between};
@@ -351,13 +351,17 @@ impl Rows {
             }
             columns
         };
-        // A flank that changes is none.
+        // A flank that changes is none, or one that friction lets go.
         let flank = |row: &Row| flank(&row.at, model.scales.friction_n_m);
-        let stays = |w: &&[Row]| w[0].at.way == w[1].at.way && flank(&w[0]) == flank(&w[1]);
-        let logs = self.rows.chunk_by(|a, b| a.at.log == b.at.log);
-        let places = logs.flat_map(|rows| {
-            let [begin, end] = [&rows[0], &rows[rows.len() - 1]].map(place);
-            rows.windows(2).filter(stays).map(move |w| (place(&w[1]), begin..end + 1))
+        let held_n_m = HELD * self.loads.iter().fold(0.0, |most: f64, (_, load)| most.max(load.abs()));
+        let held = |w: &[Row]| w.iter().all(|row| row.at.torque_n_m.abs() >= held_n_m);
+        let stays = |w: &&[Row]| held(w) && w[0].at.way == w[1].at.way && flank(&w[0]) == flank(&w[1]);
+        let session = |row: &Row| self.loads[row.number].0;
+        let mut ends = vec![0; self.means_arcsec.len()];
+        self.rows.iter().for_each(|row| ends[row.at.log] = place(row) + 1);
+        let places = self.rows.chunk_by(|a, b| session(a) == session(b)).flat_map(|rows| {
+            let of = place(&rows[0])..ends[rows[0].at.log];
+            rows.windows(2).filter(stays).map(move |w| (place(&w[1]), of.clone()))
         });
         let in_order: Vec<f64> = left.iter().flatten().copied().collect();
         let (at, size) = lasting_step(&left, columns, places, (white_noise([in_order.as_slice()]), 0.0))?;

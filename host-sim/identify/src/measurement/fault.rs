@@ -133,8 +133,8 @@ impl Fault {
     /// An index that an encoder lost before a row of a session: the error steps, by about so much, and stays.
     pub(crate) fn lost_index(session: &Session, row: usize, size_arcsec: f64, then: &str) -> Fault {
         let what = format!(
-            "the error steps by {size_arcsec:.1} arcsec within one row and stays there, whatever else the drive does: \
-             an encoder has lost its index{then}"
+            "the error steps by about {size_arcsec:.0} arcsec within one row and stays there, whatever else the drive \
+             does: an encoder has lost its index{then}"
         );
         let time_s = session.time_s.as_ref().map(|time| time[row]);
         let fault = Fault::new(FaultName::EncoderIndexJump, [session.line[row]; 2], 1);

@@ -26,7 +26,7 @@ pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, Treatment};
 use faults::clock::SESSION_GAP_PERIODS;
 pub(crate) use faults::units::other_reading;
-pub(crate) use faults::{LineFit, throughout, whole_pitches};
+pub(crate) use faults::{HELD, LineFit, throughout, whole_pitches};
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,
 };

@@ -54,8 +54,8 @@ impl Picture {
     }
 }
 
-/// Rows to either side of a step that are looked at, and are there at least. *Guess*: means of a quarter of the noise of
-/// a row.
+/// Rows to either side of a step that are looked at, and are there at least. *Guess*: means of a quarter of the noise
+/// of a row.
 const BESIDE_A_STEP: usize = 16;
 /// They are among so many rows. *Guess*: a flank is open for some dozen.
 const CLOSE_BY: usize = 64;
@@ -86,23 +86,24 @@ pub(crate) fn lasting_step(
     places: impl Iterator<Item = (usize, Range<usize>)>,
     (white, least): (f64, f64),
 ) -> Option<(usize, f64)> {
-    // Close by, where no smooth column follows.
-    let near = |(row, of): (usize, Range<usize>)| {
+    // Close by, where no smooth column follows: change from row to row, and of the mean.
+    let beside = |left: &[Option<f64>], row: usize, of: &Range<usize>| {
         let behind = left[row..of.end.min(row + CLOSE_BY)].iter().flatten();
         let before = left[row.saturating_sub(CLOSE_BY).max(of.start)..row].iter().rev().flatten();
         let jump = left[row]? - before.clone().next()?;
         let [behind, before]: [Vec<f64>; 2] =
             [behind.take(BESIDE_A_STEP).copied().collect(), before.take(BESIDE_A_STEP).copied().collect()];
-        if behind.len().min(before.len()) < BESIDE_A_STEP / 2 {
-            return None;
-        }
-        let near = mean(&behind) - mean(&before);
-        let sharp = (jump - near).abs() < AGREES * near.abs() + 4.0 * white;
-        (sharp && near.abs() > (1.0 - AGREES) * least.max(SEEN * white)).then_some((row, of.end, near))
+        let enough = behind.len().min(before.len()) >= BESIDE_A_STEP / 2;
+        enough.then(|| (jump, mean(&behind) - mean(&before)))
     };
-    let mut close_by: Vec<(usize, usize, f64)> = places.filter_map(near).collect();
+    let near = |(row, of): (usize, Range<usize>)| {
+        let (jump, near) = beside(left, row, &of)?;
+        let sharp = (jump - near).abs() < AGREES * near.abs() + 4.0 * white;
+        (sharp && near.abs() > (1.0 - AGREES) * least.max(SEEN * white)).then_some((row, of, near))
+    };
+    let mut close_by: Vec<(usize, Range<usize>, f64)> = places.filter_map(near).collect();
     close_by.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-    let mut apart: Vec<(usize, usize, f64)> = Vec::new();
+    let mut apart: Vec<(usize, Range<usize>, f64)> = Vec::new();
     for step in close_by {
         if apart.len() < MOST_PLACES && apart.iter().all(|other| other.0.abs_diff(step.0) >= BESIDE_A_STEP) {
             apart.push(step);
@@ -116,21 +117,23 @@ pub(crate) fn lasting_step(
     };
     let span = FreeSpan::default().beyond(columns().into_iter().map(counting));
     let freed = span.freed(left.iter().map(|left| left.unwrap_or(0.0)).collect());
-    let step = |(row, until, near): &(usize, usize, f64)| {
-        let of_step = (0..left.len()).map(|k| f64::from(u8::from((*row..*until).contains(&k)))).collect();
+    let step = |(row, of, near): &(usize, Range<usize>, f64)| {
+        let of_step = (0..left.len()).map(|k| f64::from(u8::from((*row..of.end).contains(&k)))).collect();
         let of_step = span.freed(counting(of_step));
         let square = dot(&of_step, &of_step);
         let size = dot(&of_step, &freed) / square;
         let stays = (OF_NEAR..=1.0 / OF_NEAR).contains(&(size / near)) && size.abs() > least.max(SEEN * white);
         let is_one = stays && 2.0 * square >= BESIDE_A_STEP as f64;
-        is_one.then_some((size * size * square, (*row, *near), size, of_step))
+        is_one.then_some((size * size * square, (*row, of.clone()), size, of_step))
     };
     let found = apart.iter().filter_map(step);
-    let (gain, step, size, of_step) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (gain, (row, of), size, of_step) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
     // What is left besides is worth fewer rows where it goes on from row to row.
     let besides: Vec<f64> = freed.iter().zip(of_step).map(|(freed, of_step)| freed - size * of_step).collect();
     let (own, next) = (dot(&besides, &besides), dot(&besides[1..], &besides[..besides.len() - 1]));
     let goes_on = if own > 0.0 { (next / own).clamp(0.0, MOST_GOES_ON) } else { 0.0 };
     let variance = own / left.iter().flatten().count() as f64 * (1.0 + goes_on) / (1.0 - goes_on);
-    (gain > LASTS * LASTS * variance).then_some(step)
+    let besides: Vec<Option<f64>> =
+        besides.into_iter().zip(left).map(|(besides, left)| left.map(|_| besides)).collect();
+    (gain > LASTS * LASTS * variance).then_some((row, size + beside(&besides, row, &of)?.1))
 }

@@ -56,6 +56,9 @@ const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// catalogues have one or two of lost motion.
 const WIDEST_CLEARANCE_RAD: f64 = 600.0 * ARCSEC;
 
+/// Load of this share of its largest holds the drive on one flank. *Guess*: above the friction of most drives.
+pub(crate) const HELD: f64 = 0.1;
+
 /// The findings of the checks so far.
 #[derive(Debug, Default)]
 pub(super) struct Findings {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::resolution::seen;
-use super::{ARCSEC, Findings, farthest, largest_torque, level, marked};
+use super::{ARCSEC, Findings, HELD, farthest, largest_torque, level, marked};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
@@ -36,8 +36,6 @@ const LARGE_RAD: f64 = 120.0 * ARCSEC;
 /// A load that changes by this share of its largest within the neighbouring rows moves the drive: the backlash is
 /// crossed, wind-up follows. *Guess*: the order of magnitude of friction.
 const SWINGS: f64 = 0.05;
-/// Load of this share of its largest holds the drive on one flank. *Guess*: above the friction of most drives.
-const HELD: f64 = 0.1;
 /// Rows before and after that are looked at. *Guess*: the least number of which a median rejects one.
 const AROUND_ONE: usize = 3;
 /// Rows around, for what is usual there. *Guess*: 30 rows in all, of which few are out.
