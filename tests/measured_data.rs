@@ -499,6 +499,7 @@ fn a_lost_index_is_found_where_it_is_and_costs_the_table_nothing() {
         let (left, faults, _) = calibrated(&text);
         let found: Vec<(u64, f64)> = faults.iter().map(|of| (of.first_line, of.size_arcsec.unwrap())).collect();
         assert_eq!(names_of(&faults), [EncoderIndexJump], "{faults:?}");
+        assert!(faults.iter().all(|of| of.treatment == Treatment::Repaired && of.time_s.is_some()), "{faults:?}");
         assert_eq!(found.len(), steps.len(), "{found:?}");
         for (row, size) in steps {
             let close = |of: &(u64, f64)| of.0 == *row as u64 + 2 && (of.1 - size).abs() < 3.0 + 0.1 * size.abs();
