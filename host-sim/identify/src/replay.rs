@@ -163,8 +163,8 @@ impl RowsOf {
 }
 
 /// Of rows where a table was not recorded.
-const ELSEWHERE: &str = "are in a part of the output's turn that the table was not recorded at: its error there, and \
-                         torques from the wind-up, are not known";
+const ELSEWHERE: &str = "are where the table was not recorded over the output's turn, or within 10 deg of that: its \
+                         error there, and torques from the wind-up, are not known";
 /// Remark on rows whose owner is not stated.
 const OF_NOBODY: &str =
     "no file next to the rows names their drive and generator: whether the table is theirs was not checked";
