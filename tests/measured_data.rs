@@ -522,7 +522,7 @@ fn a_sound_drive_loses_no_index() {
         else {
             continue;
         };
-        let lost = made.calibration.data_faults.into_iter().filter(|fault| fault.name == EncoderIndexJump);
+        let lost = made.calibration.data_faults.into_iter().find(|fault| fault.name == EncoderIndexJump);
         alarms.extend(lost.map(|fault| format!("seed {seed} {said:?}: {}", fault.what)));
     }
     assert!(alarms.len() as f64 <= 0.01 * seeds as f64, "{} in {seeds}:\n{}", alarms.len(), alarms.join("\n"));
