@@ -499,10 +499,8 @@ fn calibrated<T>(
         // Sessions before a lost index and behind it have other zeros, too.
         let recorded = Recorded::of(&files, prior);
         let rows = settled(&files, prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
-        let plain = fit(rows, prior, &recorded, &[]).ok();
-        if let Some(parted) =
-            plain.and_then(|fitted| at_lost_index(given, &files, (&fitted.rows, &fitted.model), prior))
-        {
+        let plain = fit(rows, prior, &recorded, &[]);
+        if let Some(parted) = at_lost_index(given, &files, &plain, prior) {
             return calibrated(&parted, known, say);
         }
         files = anew;
@@ -536,9 +534,7 @@ fn calibrated<T>(
     let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
     let (files, recorded) = (&files, &recorded);
     let fitted = fit(rows.clone().less(prior), prior, recorded, &[]);
-    let open = fitted.as_ref().ok();
-    if let Some(parted) = open.and_then(|Fitted { rows, model, .. }| at_lost_index(given, files, (rows, model), prior))
-    {
+    if let Some(parted) = at_lost_index(given, files, &fitted, prior) {
         return calibrated(&parted, known, say);
     }
     fitted
@@ -563,34 +559,40 @@ fn by_zeros(file: &Recording, begins: impl Fn(&Session) -> bool) -> Vec<Recordin
     pieces
 }
 
-/// The logs `given` with another zero from where an encoder lost its index, in what a model leaves of `rows` of them,
-/// then in `files`; none where it lost none.
+/// The logs `given` with another zero from where an encoder lost its index, in what a fit leaves of `files`, made of
+/// them; none where it lost none, or there is no fit.
 fn at_lost_index(
     given: &[Recording],
     files: &[Recording],
-    (rows, model): (&Rows, &Model),
+    fitted: &Result<Fitted, CalibrationError>,
     prior: &Prior<'_>,
 ) -> Option<Vec<Recording>> {
-    let faults = given.iter().flat_map(|file| &file.faults);
-    if faults.filter(|fault| fault.name == FaultName::EncoderIndexJump).count() >= MOST_LOST {
+    let lost = |file: &Recording| file.faults.iter().filter(|of| of.name == FaultName::EncoderIndexJump).count();
+    if given.iter().map(lost).sum::<usize>() >= MOST_LOST {
         return None;
     }
+    let Fitted { rows, model, .. } = fitted.as_ref().ok()?;
     let (log, line, size_arcsec) = rows.lost_index(model)?;
     let mut parted = given.to_vec();
     let file = parted.iter_mut().find(|file| file.file == files[log].file)?;
+    part(file, line, size_arcsec, prior)?;
+    Some(parted)
+}
+
+/// Gives a log another zero from a line on, where an encoder lost its index.
+fn part(log: &mut Recording, line: u64, size_arcsec: f64, prior: &Prior<'_>) -> Option<()> {
     let at = |session: &Session| session.line.iter().position(|of| *of == line);
-    let (place, row) = file.sessions.iter().enumerate().find_map(|(k, session)| Some((k, at(session)?)))?;
-    let whole = file.sessions[place].clone();
+    let (place, row) = log.sessions.iter().enumerate().find_map(|(k, session)| Some((k, at(session)?)))?;
+    let whole = &log.sessions[place];
     let behind = Session { own_zero: true, ..whole.part(row..whole.len()) };
     let pitches = whole_pitches(size_arcsec / ARCSEC_PER_RAD, &prior.nominal.gear(), WHOLE_PITCH, 0.0);
-    let or = match pitches {
-        Some(pitches) => format!("teeth have skipped by {pitches}"),
-        None => "a load that is not recorded has turned the flank over".to_owned(),
-    };
+    let flank = || "a load that is not recorded has turned the flank over".to_owned();
+    let or = pitches.map_or_else(flank, |pitches| format!("teeth have skipped by {pitches}"));
     let then = format!(", or {or}; the zero behind it is fitted on its own");
-    file.faults.push(Fault::lost_index(&whole, row, size_arcsec, &then));
-    file.sessions.splice(place..=place, [whole.part(0..row), behind]);
-    Some(parted)
+    log.faults.push(Fault::lost_index(whole, row, size_arcsec, &then));
+    let before = whole.part(0..row);
+    log.sessions.splice(place..=place, [before, behind]);
+    Some(())
 }
 
 /// Logs in pieces of a session each, if sessions have zeros of their own: these leave far less than
@@ -644,16 +646,12 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     log.sessions = sessions;
     // Behind a lost index the output has another zero.
     for _ in 0..MOST_LOST {
-        let given = std::slice::from_ref(&log);
         let files: Vec<Recording> = by_zeros(&log, |session| session.own_zero);
         let recorded = Recorded::of(&files, &prior);
         let rows = settled(&files, &prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
         let none = Model { chosen: Vec::new(), coefficients: Vec::new(), scales: recorded.scales };
-        let Some(parted) = at_lost_index(given, &files, (&rows, &none), &prior).and_then(|mut parted| parted.pop())
-        else {
-            break;
-        };
-        log = parted;
+        let Some((_, line, size)) = rows.lost_index(&none) else { break };
+        part(&mut log, line, size, &prior);
     }
     if set_anew(std::slice::from_ref(&log), &prior).is_some() {
         log.sessions.iter_mut().for_each(|session| session.own_zero = true);

@@ -336,7 +336,8 @@ impl Rows {
     /// zero, and how far that is off, arcsec.
     pub(crate) fn lost_index(&self, model: &Model) -> Option<(usize, u64, f64)> {
         // Rows that do not count, and the end of a session, keep those beside them apart.
-        let place = |row: &Row| row.number + self.loads[row.number].0;
+        let session = |row: &Row| self.loads[row.number].0;
+        let place = |row: &Row| row.number + session(row);
         let mut left = vec![None; place(self.rows.last()?) + 1];
         for row in &self.rows {
             left[place(row)] = Some(row.left_arcsec - model.adds_arcsec(&row.at));
@@ -356,7 +357,6 @@ impl Rows {
         let held_n_m = HELD * self.loads.iter().fold(0.0, |most: f64, (_, load)| most.max(load.abs()));
         let held = |w: &[Row]| w.iter().all(|row| row.at.torque_n_m.abs() >= held_n_m);
         let stays = |w: &&[Row]| held(w) && w[0].at.way == w[1].at.way && flank(&w[0]) == flank(&w[1]);
-        let session = |row: &Row| self.loads[row.number].0;
         let mut ends = vec![0; self.means_arcsec.len()];
         self.rows.iter().for_each(|row| ends[row.at.log] = place(row) + 1);
         let places = self.rows.chunk_by(|a, b| session(a) == session(b)).flat_map(|rows| {

@@ -229,10 +229,14 @@ pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignm
     let gain = 1.0 - least / usual.max(f64::MIN_POSITIVE);
     let flat = gain < LEAST_GAIN;
     let doubtful = !flat && second < least * (1.0 + LEAST_BEFORE_SECOND);
-    let why = if doubtful {
+    let takes =
+        format!("the best phase explains {:.1} % of the variance that remains with the usual one", 100.0 * gain);
+    let why = if flat {
+        format!("{takes}; {:.0} % are asked for", 100.0 * LEAST_GAIN)
+    } else if doubtful {
         "another phase is as good".to_owned()
     } else {
-        format!("the best phase explains {:.1} % of the variance that remains with the usual one", 100.0 * gain)
+        takes
     };
     Alignment {
         generator_zero_deg: within(zero, repeats).to_degrees(),

@@ -103,7 +103,7 @@ pub(crate) fn step(
     };
     let inside = rows.sessions_used().flat_map(|session| {
         let from = session.start;
-        session.skip(1).filter(follows).map(move |k| (k, from..rows.len()))
+        session.skip(1).filter(|k| left[*k].is_some()).filter(follows).map(move |k| (k, from..rows.len()))
     });
     let (row, _) = lasting_step(&left, || columns(problem, selected), inside, (white, unknown))?;
     let number = rows.sessions.iter().position(|session| session.contains(&row))?;

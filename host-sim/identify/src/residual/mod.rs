@@ -54,8 +54,7 @@ impl Picture {
     }
 }
 
-/// Rows to either side of a step that are looked at, and are there at least. *Guess*: means of a quarter of the noise
-/// of a row.
+/// Rows to either side of a step that are looked at. *Guess*: means of a quarter of the noise of a row.
 const BESIDE_A_STEP: usize = 16;
 /// They are among so many rows. *Guess*: a flank is open for some dozen.
 const CLOSE_BY: usize = 64;
@@ -71,8 +70,7 @@ const OF_NEAR: f64 = 0.5;
 /// Places that are held against the columns, at most: the largest close by. *Guess*: one in sixteen is right.
 const MOST_PLACES: usize = 16;
 
-/// It is this many standard deviations. *Guess*: more than the five by which causes are separated, as what is left is
-/// not all noise.
+/// It is this many standard deviations. *Guess*: what is left is not all noise, for which five would do.
 const LASTS: f64 = 8.0;
 /// Correlation of successive rows, at most. *Guess*: a hundredth of them counts.
 const MOST_GOES_ON: f64 = 0.98;

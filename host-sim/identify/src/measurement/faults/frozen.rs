@@ -24,8 +24,7 @@ const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
 /// *Guess*.
 const LONG_DWELL_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
 
-/// A change is that many whole tooth pitches if it differs by less than this share of one. *Guess*: pitch errors of
-/// fine gears are a third of that.
+/// A change is whole tooth pitches within this share of one. *Guess*: pitch errors of fine gears are a third of that.
 const WHOLE_PITCH: f64 = 0.01;
 
 /// Length of a stretch that chance does not give in this many rows, of a channel that changes at every second row at
