@@ -514,6 +514,11 @@ fn a_lost_index_is_found_where_it_is_and_costs_the_table_nothing() {
         let [with, without] = [replayed(&text), replayed(&changed(|_| {}))];
         assert!(with < 1.1 * without, "{with} for {without}");
     }
+    // That of the generator, 0.03 rad: before it is taken out it keeps parts from being chosen.
+    let (_, faults, _) = calibrated(&changed(|b| shifted(&mut b.generator_rad[1700..], 0.03)));
+    let [lost] = &faults[..] else { panic!("{faults:?}") };
+    let off = lost.size_arcsec.unwrap() + 0.03 / 95.0 / ARCSEC;
+    assert!((lost.name, lost.first_line) == (EncoderIndexJump, 1702) && off.abs() < 6.0, "{lost:?}");
 }
 
 #[test]

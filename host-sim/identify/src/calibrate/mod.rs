@@ -571,8 +571,8 @@ fn at_lost_index(
     if given.iter().map(lost).sum::<usize>() >= MOST_LOST {
         return None;
     }
-    let Fitted { rows, model, .. } = fitted.as_ref().ok()?;
-    let (log, line, size_arcsec) = rows.lost_index(model)?;
+    let Fitted { rows, folds, model, .. } = fitted.as_ref().ok()?;
+    let (log, line, size_arcsec) = rows.lost_index(model, &folds.parts)?;
     let mut parted = given.to_vec();
     let file = parted.iter_mut().find(|file| file.file == files[log].file)?;
     part(file, line, size_arcsec, prior)?;
@@ -650,7 +650,7 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         let recorded = Recorded::of(&files, &prior);
         let rows = settled(&files, &prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
         let none = Model { chosen: Vec::new(), coefficients: Vec::new(), scales: recorded.scales };
-        let Some((_, line, size)) = rows.lost_index(&none) else { break };
+        let Some((_, line, size)) = rows.lost_index(&none, &[]) else { break };
         part(&mut log, line, size, &prior);
     }
     if set_anew(std::slice::from_ref(&log), &prior).is_some() {

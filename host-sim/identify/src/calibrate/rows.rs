@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::Model;
 use super::folds::{Folds, Row};
+use super::interval::{row as row_of, width_of};
 use super::parts::{PartName, Scales, State, flank};
 use super::prior::Prior;
 use crate::least_squares::Normal;
@@ -332,9 +333,9 @@ impl Rows {
         if about > 0.0 { (explained / about).clamp(0.0, 1.0).sqrt() } else { 0.0 }
     }
 
-    /// Where an encoder lost its index, in what a model leaves: the log, the line from which on the error has another
-    /// zero, and how far that is off, arcsec.
-    pub(crate) fn lost_index(&self, model: &Model) -> Option<(usize, u64, f64)> {
+    /// Where an encoder lost its index, in what a model leaves, beside all `parts` that may be there: the log, the line
+    /// from which on the error has another zero, and how far that is off, arcsec.
+    pub(crate) fn lost_index(&self, model: &Model, parts: &[PartName]) -> Option<(usize, u64, f64)> {
         // Rows that do not count, and the end of a session, keep those beside them apart.
         let session = |row: &Row| self.loads[row.number].0;
         let place = |row: &Row| row.number + session(row);
@@ -344,10 +345,10 @@ impl Rows {
         }
         let columns = || {
             let logs = self.means_arcsec.len();
-            let mut columns = vec![vec![0.0; left.len()]; logs + model.coefficients.len()];
+            let mut columns = vec![vec![0.0; left.len()]; logs + width_of(parts)];
             for row in &self.rows {
                 columns[row.at.log][place(row)] = 1.0;
-                let of_parts = columns[logs..].iter_mut().zip(model.columns(&row.at));
+                let of_parts = columns[logs..].iter_mut().zip(row_of(parts, &row.at, &model.scales));
                 of_parts.for_each(|(column, value)| column[place(row)] = value);
             }
             columns
