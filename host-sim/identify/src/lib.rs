@@ -56,6 +56,7 @@ pub mod look;
 pub mod measurement;
 mod misfit;
 pub mod nominal;
+mod parts;
 pub mod replay;
 pub mod residual;
 pub mod synthesize;

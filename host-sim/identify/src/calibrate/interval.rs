@@ -17,7 +17,9 @@ use serde::Serialize;
 
 use super::Model;
 use super::folds::{FLOOR, Row};
-use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, place, usual_arcsec, weights};
+use super::parts::{
+    GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, place, row, usual_arcsec, weights, width_of,
+};
 use crate::linear::{Gram, Prior, Solution, solve};
 use crate::measurement::{median_of, white_noise};
 
@@ -68,19 +70,7 @@ pub(super) fn variance(covariance: &[f64], x: &[f64]) -> f64 {
     rows.zip(x).filter(|(_, a)| **a != 0.0).map(|(row, a)| a * dot(row, x)).sum::<f64>().max(0.0)
 }
 
-/// How many columns some parts have.
-pub(super) fn width_of(parts: &[PartName]) -> usize {
-    parts.iter().map(|part| weights(*part).len()).sum()
-}
-
-/// All columns of some parts in a state.
-pub(super) fn row(parts: &[PartName], at: &State, scales: &Scales) -> Vec<f64> {
-    let mut x = Vec::new();
-    parts.iter().for_each(|part| columns(*part, at, scales, &mut x));
-    x
-}
-
-/// The same as a row of a group: one for its zero first, the value last.
+/// All columns of some parts in a state as a row of a group: one for its zero first, the value last.
 pub(super) fn row_of_group(parts: &[PartName], at: &State, scales: &Scales, value: f64) -> Vec<f64> {
     [vec![1.0], row(parts, at, scales), vec![value]].concat()
 }

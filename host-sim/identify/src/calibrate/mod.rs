@@ -15,7 +15,6 @@
 mod at_rest;
 mod folds;
 mod interval;
-mod parts;
 mod plan;
 mod prior;
 mod reading;
@@ -34,6 +33,8 @@ use crate::measurement::{
     Fault, FaultName, MeasuredError, Recording, Session, least_and_most, median_of, whole_pitches,
 };
 use crate::misfit::LEAVES;
+use crate::parts::{self, usual_arcsec};
+pub use crate::parts::{PartName, Scales, State};
 use crate::residual::{is_no_noise, strongest};
 pub use at_rest::{LoopFigure, TorqueLoop};
 use flexspline_base::robust::{dot, rms};
@@ -45,8 +46,7 @@ pub(crate) use folds::LEAST_GAIN;
 use folds::{Chosen, Folds};
 pub(crate) use interval::OF_95;
 pub use interval::{ModelUncertainty, Node, RowNoise};
-use parts::usual_arcsec;
-pub use parts::{PartName, Scales, State};
+
 pub use plan::{Bench, Pass, Planned, plan};
 pub use prior::Prior;
 pub use reading::{ByCore, Reading};

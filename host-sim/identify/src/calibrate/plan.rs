@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::interval::{Node, RowNoise, planned_covariance, row_of_group, spread, width_of, widths};
-use super::parts::{PartName, Scales, State, place, weights};
+use super::interval::{Node, RowNoise, planned_covariance, row_of_group, spread, widths};
+use super::parts::{PartName, Scales, State, place, weights, width_of};
 use super::rows::{MOST_ROWS, Recorded, late_s};
 use super::{CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH};
 use crate::linear::Gram;

@@ -4,8 +4,7 @@ use std::f64::consts::TAU;
 
 use super::Model;
 use super::folds::{Folds, Row};
-use super::interval::{row as row_of, width_of};
-use super::parts::{PartName, Scales, State, flank};
+use super::parts::{self, PartName, Scales, State, flank, width_of};
 use super::prior::Prior;
 use crate::least_squares::Normal;
 use crate::measurement::{HELD, Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
@@ -348,7 +347,7 @@ impl Rows {
             let mut columns = vec![vec![0.0; left.len()]; logs + width_of(parts)];
             for row in &self.rows {
                 columns[row.at.log][place(row)] = 1.0;
-                let of_parts = columns[logs..].iter_mut().zip(row_of(parts, &row.at, &model.scales));
+                let of_parts = columns[logs..].iter_mut().zip(parts::row(parts, &row.at, &model.scales));
                 of_parts.for_each(|(column, value)| column[place(row)] = value);
             }
             columns

@@ -66,15 +66,15 @@ impl PartName {
 }
 
 /// Waves of a curve over the generator's turn, or over that against the output: what a table holds.
-pub(super) const GENERATOR_ORDERS: u16 = 8;
+pub(crate) const GENERATOR_ORDERS: u16 = 8;
 /// Waves of the curve over the output's turn: an encoder's two, the weight of an arm that swings through angles and
 /// winds up a spring that hardens (up to three times its order), and some more. Chosen on the two records of
 /// `examples/`.
-pub(super) const OUTPUT_ORDERS: u16 = 6;
+pub(crate) const OUTPUT_ORDERS: u16 = 6;
 /// Waves of the curve over a tooth pitch: eight nodes of a table hold them.
-pub(super) const TOOTH_ORDERS: u16 = 3;
+pub(crate) const TOOTH_ORDERS: u16 = 3;
 /// Degree of the wind-up over the torques recorded.
-pub(super) const WIND_UP_DEGREE: usize = 6;
+pub(crate) const WIND_UP_DEGREE: usize = 6;
 /// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come
 /// into contact. A polynomial has no such bend, and swings between the loads recorded instead. A guess, between the
 /// dead zone and the first loads of a plan.
@@ -127,7 +127,7 @@ pub struct Scales {
 }
 
 impl Scales {
-    pub(super) fn most_torque(&self) -> f64 {
+    pub(crate) fn most_torque(&self) -> f64 {
         self.torque_n_m[0].abs().max(self.torque_n_m[1].abs()).max(1e-9)
     }
 }
@@ -138,7 +138,7 @@ fn share(value: f64, [low, high]: [f64; 2]) -> f64 {
 }
 
 /// Puts the columns of a part in a state at the end of `to`.
-pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<f64>) {
+pub(crate) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<f64>) {
     // Beyond the loads recorded nothing grows further.
     let [low, high] = scales.torque_n_m;
     let load = at.torque_n_m.clamp(low.min(0.0), high.max(0.0)) / scales.most_torque();
@@ -183,7 +183,7 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
 }
 
 /// The angles that a part has waves of, with their orders, where generator and output stand so.
-pub(super) fn wave_angles(
+pub(crate) fn wave_angles(
     part: PartName,
     generator_rad: f64,
     output_rad: f64,
@@ -202,12 +202,12 @@ pub(super) fn wave_angles(
 }
 
 /// The flank that bears: 1 where the load turns the output forward, or it lags without one; else -1.
-pub(super) fn flank(at: &State, friction_n_m: f64) -> f64 {
+pub(crate) fn flank(at: &State, friction_n_m: f64) -> f64 {
     if at.torque_n_m.abs() > friction_n_m { at.torque_n_m.signum() } else { -at.way }
 }
 
 /// The weights of a part's columns in its penalty.
-pub(super) fn weights(part: PartName) -> Vec<f64> {
+pub(crate) fn weights(part: PartName) -> Vec<f64> {
     match part {
         PartName::WindUp => {
             // A straight line is no wrinkle: where loads are few, what they leave open is straight.
@@ -227,8 +227,20 @@ pub(super) fn weights(part: PartName) -> Vec<f64> {
     }
 }
 
+/// How many columns some parts have.
+pub(crate) fn width_of(parts: &[PartName]) -> usize {
+    parts.iter().map(|part| weights(*part).len()).sum()
+}
+
+/// All columns of some parts in a state.
+pub(crate) fn row(parts: &[PartName], at: &State, scales: &Scales) -> Vec<f64> {
+    let mut x = Vec::new();
+    parts.iter().for_each(|part| columns(*part, at, scales, &mut x));
+    x
+}
+
 /// Where the columns of a part stand among those of some parts.
-pub(super) fn place(parts: impl IntoIterator<Item = PartName>, part: PartName) -> Option<Range<usize>> {
+pub(crate) fn place(parts: impl IntoIterator<Item = PartName>, part: PartName) -> Option<Range<usize>> {
     let mut end = 0;
     parts.into_iter().find_map(|other| {
         let begin = end;
@@ -244,7 +256,7 @@ const BENDS: f64 = 0.15;
 
 /// Standard deviation of a part's coefficients before the rows say anything, arcsec, of a column of weight one; of the
 /// straight part of the wind-up, that of any. `coefficients` are those found: a part is as large as its largest.
-pub(super) fn expected_arcsec(part: PartName, scales: &Scales, coefficients: &[f64]) -> f64 {
+pub(crate) fn expected_arcsec(part: PartName, scales: &Scales, coefficients: &[f64]) -> f64 {
     let sizes = coefficients.iter().zip(weights(part)).map(|(value, weight)| value.abs() * weight.sqrt());
     let largest = sizes.fold(0.0, f64::max);
     match part {
@@ -259,7 +271,7 @@ pub(super) fn expected_arcsec(part: PartName, scales: &Scales, coefficients: &[f
 /// The same of a drive that nobody has measured. Wind-up: of 200 arcsec at either end of the loads, as a drive of the
 /// catalogue at its rated torque has. Play: its lost motion is less than an arc-minute. Waves: its transmission error
 /// is less than an arc-minute from peak to peak, of an encoder's mounting as much. *Guesses* in between.
-pub(super) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
+pub(crate) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
     match part {
         PartName::WindUp => BENDS * 200.0,
         PartName::Play => HALF_A_LOST_MOTION_ARCSEC,
