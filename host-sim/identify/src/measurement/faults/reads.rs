@@ -16,8 +16,7 @@ use std::ops::Range;
 
 use super::outliers::repeat_with_position;
 use super::resolution::seen;
-use super::state::StateModel;
-use super::{ARCSEC, Findings, farthest, marked};
+use super::{ARCSEC, Findings, farthest, marked, state};
 use crate::least_squares::Normal;
 use crate::measurement::columns::Quantity;
 use crate::measurement::cubic_at_zero;
@@ -247,7 +246,7 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         // Waves of the drive that fast rows are too far apart to follow scatter as well: what shows has to show without
         // what its state explains, too.
         if without_state {
-            let Some(left) = StateModel::new(log, gear).left() else { break };
+            let Some(left) = state::left(log, gear) else { break };
             reads.error = Cow::Owned(left);
         }
         late = late_rows(&mut reads, fast, gear);
