@@ -306,10 +306,7 @@ pub(crate) const GRAVITY_TORQUE: CauseSpec = CauseSpec {
         phase("of sin(output + orientation + phase)"),
     ],
     laws: gravity_torques,
-    simulated: |on, p| {
-        let shape = [Name::TorqueNM, Name::PhaseRad].map(|name| (name, p(name)));
-        gravity_torque(on.base.law, on, on).with(&shape, [])
-    },
+    simulated: |on, p| gravity_torque(on.base.law, on, on).with(p, &[], []),
     ..plain()
 };
 
@@ -326,10 +323,7 @@ pub(crate) const TORSIONAL_RESONANCE: CauseSpec = CauseSpec {
         number(Name::DampingRatio, "of critical damping", 0.001, 0.9, Value(0.03)),
     ],
     laws: |on| vec![torsional_resonance(on)],
-    simulated: |on, p| {
-        let shape = [Name::FrequencyHz, Name::DampingRatio].map(|name| (name, p(name)));
-        torsional_resonance(on).with(&shape, [WIND_UP, KINEMATIC, TURNING].map(|role| (role, 1.0)))
-    },
+    simulated: |on, p| torsional_resonance(on).with(p, &[], [WIND_UP, KINEMATIC, TURNING].map(|role| (role, 1.0))),
     ..plain()
 };
 

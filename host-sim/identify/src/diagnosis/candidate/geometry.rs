@@ -378,21 +378,20 @@ fn damaged_tooth(of: Angle) -> Law {
 }
 
 /// A wave of this amplitude whose crest is at a phase.
-fn crest_at(amplitude: f64, phase: f64) -> [f64; 2] {
+pub(super) fn crest_at(amplitude: f64, phase: f64) -> [f64; 2] {
     [amplitude * phase.cos(), amplitude * phase.sin()]
 }
 
 /// A displacement of known size.
 fn simulated_displacement(cause: CauseName, of: Angle, on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let shape = [Name::PhaseRad, Name::HalfLoadNM].map(|name| (name, p(name)));
-    displaced(cause, of, on).with(&[shape[0], shape[1], (Name::SizeArcsec, p(Name::AmplitudeArcsec))], [])
+    displaced(cause, of, on).with(p, &[(Name::SizeArcsec, p(Name::AmplitudeArcsec))], [])
 }
 
 /// A pitch error of one known wave.
 fn simulated_pitch(cause: CauseName, of: Angle, p: Values<'_>) -> Simulated {
     let harmonic = p(Name::Harmonic);
     let wave = crest_at(p(Name::AmplitudeArcsec), harmonic * p(Name::PhaseRad));
-    higher_harmonic(cause, of, harmonic).with(&[], wave.map(|c| (Tag::WAVE, c)))
+    higher_harmonic(cause, of, harmonic).with(p, &[], wave.map(|c| (Tag::WAVE, c)))
 }
 
 /// An error of shape or place of a toothed wheel.
@@ -450,7 +449,7 @@ pub(crate) const CIRCULAR_SPLINE_OVALITY: CauseSpec = CauseSpec {
     laws: |on| vec![on.kernels().map_or_else(ovality, kernel::ovality)],
     simulated: |_, p| {
         let [sine, cosine] = crest_at(p(Name::AmplitudeArcsec), 2.0 * p(Name::PhaseRad));
-        ovality().with(&[], [(Tag::WAVE, sine), (Tag::WAVE, -cosine)])
+        ovality().with(p, &[], [(Tag::WAVE, sine), (Tag::WAVE, -cosine)])
     },
     ..OF_WHEELS
 };
@@ -487,7 +486,7 @@ pub(crate) const CAM_FORM_ERROR: CauseSpec = CauseSpec {
     twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
     laws: |_| vec![cam_form_error()],
     simulated: |_, p| {
-        cam_form_error().with(&[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (Tag::WAVE, c)))
+        cam_form_error().with(p, &[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (Tag::WAVE, c)))
     },
     ..plain()
 };
@@ -512,9 +511,8 @@ pub(crate) const DAMAGED_TOOTH: CauseSpec = CauseSpec {
     laws: |_| vec![damaged_tooth(Angle::Flexspline), damaged_tooth(Angle::CircularSpline).variant("circular spline")],
     simulated: |_, p| {
         let of = if p(Name::Wheel) == 0.0 { Angle::Flexspline } else { Angle::CircularSpline };
-        let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
         // What the load on it gives way by.
-        damaged_tooth(of).with(&shape, [0.0, -p(Name::AmplitudeArcsec), 0.0, 0.0].map(|c| (PULSE, c)))
+        damaged_tooth(of).with(p, &[], [0.0, -p(Name::AmplitudeArcsec), 0.0, 0.0].map(|c| (PULSE, c)))
     },
     ..plain()
 };

@@ -6,7 +6,7 @@
 //! vanish.
 
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
-use super::geometry::{Angle, OF_WHEELS, USUAL_ARCSEC, kept, waves, weighted_waves};
+use super::geometry::{Angle, OF_WHEELS, USUAL_ARCSEC, crest_at, kept, waves, weighted_waves};
 use super::{
     Excitation, Law, Named, Regressor, Shape, Shaped, Simulated, Tag, Values, beside, by_row, main, main_about,
     nuisance, of_wave, times,
@@ -136,13 +136,11 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
 /// An eccentric generator of known size; the ring's first order is a part of the flexspline's, at twice its phase.
 fn simulated_generator_eccentricity(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
     let (amplitude, phase, deeper) = (p(Name::AmplitudeArcsec), p(Name::PhaseRad), p(Name::DeeperArcsec));
-    let [flexspline, ring] = [(amplitude, phase), (RING_OF_FLEXSPLINE * amplitude, 2.0 * phase)]
-        .map(|(amplitude, phase)| [amplitude * phase.cos(), amplitude * phase.sin()]);
-    let teeth = TEETH.iter().zip([flexspline, ring]).flat_map(|((_, role), wave)| wave.map(|c| (*role, c)));
+    let waves = [crest_at(amplitude, phase), crest_at(RING_OF_FLEXSPLINE * amplitude, 2.0 * phase)];
+    let teeth = TEETH.iter().zip(waves).flat_map(|((_, role), wave)| wave.map(|c| (*role, c)));
     // Where a lobe is pressed in by what it is deeper, half of it shows.
     let pressed = deeper * on.scales.load / p(Name::HalfLoadNM);
-    generator_eccentricity(on)
-        .with(&[(Name::DeeperArcsec, deeper), (Name::PressedArcsec, pressed)], teeth.chain([(TAKEN_UNLOADED, -deeper)]))
+    generator_eccentricity(on).with(p, &[(Name::PressedArcsec, pressed)], teeth.chain([(TAKEN_UNLOADED, -deeper)]))
 }
 
 /// First order of the circular spline over that of the flexspline in simulated data. *Guess*.

@@ -136,7 +136,7 @@ const FEWEST_PERIODS: f64 = 1.5;
 /// A wave of known size in a turn of an encoder.
 fn simulated_encoder(law: Law, p: Values<'_>) -> Simulated {
     let (sin, cos) = p(Name::PhaseRad).sin_cos();
-    law.with(&[], [sin, cos].map(|part| (Tag::WAVE, part * p(Name::AmplitudeArcsec))))
+    law.with(p, &[], [sin, cos].map(|part| (Tag::WAVE, part * p(Name::AmplitudeArcsec))))
 }
 
 /// Subdivisions of both encoders, of the output's those that come often enough.
@@ -247,7 +247,7 @@ pub(crate) const SENSOR_LATENCY: CauseSpec = CauseSpec {
     made_by_loads: true,
     parameters: &[number(Name::DelayS, "positive: the output's is older", -0.1, 0.1, Value(0.002))],
     laws: |_| vec![sensor_latency()],
-    simulated: |_, p| sensor_latency().with(&[], [(Tag::SIZE, p(Name::DelayS))]),
+    simulated: |_, p| sensor_latency().with(p, &[], [(Tag::SIZE, p(Name::DelayS))]),
     ..plain()
 };
 
@@ -260,6 +260,6 @@ pub(crate) const RATIO_ERROR: CauseSpec = CauseSpec {
     made_by_loads: true,
     parameters: &[number(Name::RatioRelativeError, "of the output angle", -0.01, 0.01, Value(1e-4))],
     laws: |_| vec![ratio_error()],
-    simulated: |_, p| ratio_error().with(&[], [(Tag::SIZE, p(Name::RatioRelativeError))]),
+    simulated: |_, p| ratio_error().with(p, &[], [(Tag::SIZE, p(Name::RatioRelativeError))]),
     ..plain()
 };

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Acting, Excitation, Law, Named, Tag, Tolerance};
+use super::{Acting, Excitation, Law, Named, Shape, Tag, Tolerance};
 use crate::causes::ParameterName;
 
 /// The values of the parameters of a cause, by their names.
@@ -16,11 +16,20 @@ pub(crate) struct Simulated {
 }
 
 impl Law {
-    /// The law with these numbers. A shape parameter that is not among them has its least value, a column its usual
-    /// coefficient: 0 for a deviation. Coefficients of one role are those of its columns in their order.
-    pub(super) fn with(self, shape: &[Named], coefficients: impl IntoIterator<Item = (Tag, f64)>) -> Simulated {
+    /// The law with these numbers. A shape parameter that is not among them has the value of the parameter of the cause
+    /// that is called so, or else its least one; a column has its usual coefficient: 0 for a deviation. Coefficients of
+    /// one role are those of its columns in their order.
+    pub(super) fn with(
+        self,
+        p: Values<'_>,
+        shape: &[Named],
+        coefficients: impl IntoIterator<Item = (Tag, f64)>,
+    ) -> Simulated {
+        let parameters = self.cause().map_or(&[][..], |cause| cause.spec().parameters);
+        let of_cause = |name: ParameterName| parameters.iter().any(|of| of.name == name).then(|| p(name));
         let given = |name: ParameterName| shape.iter().find(|(of, _)| *of == name).map(|(_, value)| *value);
-        let shape = self.shapes.iter().map(|shape| given(shape.name).unwrap_or(shape.low)).collect();
+        let value = |shape: &Shape| given(shape.name).or_else(|| of_cause(shape.name)).unwrap_or(shape.low);
+        let shape = self.shapes.iter().map(value).collect();
         Simulated { law: self, shape, coefficients: coefficients.into_iter().collect() }
     }
 }

@@ -319,8 +319,7 @@ pub(crate) const CRACKED_TOOTH_ROOT: CauseSpec = CauseSpec {
     laws: |_| vec![cracked_tooth_root()],
     simulated: |on, p| {
         let size = p(Name::AmplitudeArcsec) * on.scales.load / p(Name::FullLoadNM);
-        let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
-        cracked_tooth_root().with(&shape, [(Tag::SIZE, size)])
+        cracked_tooth_root().with(p, &[], [(Tag::SIZE, size)])
     },
     ..plain()
 };
@@ -337,7 +336,7 @@ pub(crate) const BACKLASH_GROWTH: CauseSpec = CauseSpec {
     laws: |_| vec![backlash_growth()],
     simulated: |on, p| {
         let half = on.base.half_backlash.max(1.0);
-        backlash_growth().with(&[], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
+        backlash_growth().with(p, &[], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
     },
     ..plain()
 };
@@ -359,7 +358,7 @@ pub(crate) const WEAR: CauseSpec = CauseSpec {
         laws.extend(wear_between_sessions(on).filter(|_| timed));
         laws
     },
-    simulated: |_, p| wear(false).with(&[(Name::Exponent, 1.0)], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec))]),
+    simulated: |_, p| wear(false).with(p, &[(Name::Exponent, 1.0)], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec))]),
     ..plain()
 };
 
@@ -379,7 +378,7 @@ pub(crate) const STIFFNESS_HARDENING: CauseSpec = CauseSpec {
     simulated: |on, p| {
         let exponent = p(Name::HardeningExponent);
         let size = p(Name::HardeningArcsec) * (on.scales.load / p(Name::FullLoadNM)).powf(exponent);
-        stiffness_hardening().with(&[(Name::Exponent, exponent)], [(Tag::SIZE, size)])
+        stiffness_hardening().with(p, &[(Name::Exponent, exponent)], [(Tag::SIZE, size)])
     },
     ..plain()
 };
@@ -394,7 +393,7 @@ pub(crate) const STIFFNESS_ERROR: CauseSpec = CauseSpec {
     place: |placing| placing.set_stiffness(),
     parameters: &[number(Name::StiffnessRatio, "true over nominal", 0.05, 20.0, Value(0.8))],
     laws: |_| vec![stiffness_error()],
-    simulated: |_, p| stiffness_error().with(&[], [(Tag::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)]),
+    simulated: |_, p| stiffness_error().with(p, &[], [(Tag::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)]),
     ..plain()
 };
 
@@ -413,11 +412,10 @@ pub(crate) const TORSIONAL_HYSTERESIS: CauseSpec = CauseSpec {
     ],
     laws: |on| vec![torsional_hysteresis(on)],
     simulated: |on, p| {
-        let slip = p(Name::SlipTorqueNM);
-        let held = held(on.scales.load, slip);
+        let held = held(on.scales.load, p(Name::SlipTorqueNM));
         // A spring that slips beyond the load opens no loop: its width is what it can hold.
         let width = p(Name::HalfWidthArcsec) / if held > 0.0 { held } else { 1.0 };
-        torsional_hysteresis(on).with(&[(Name::SlipTorqueNM, slip)], [(SPRING, width)])
+        torsional_hysteresis(on).with(p, &[], [(SPRING, width)])
     },
     ..plain()
 };
@@ -433,7 +431,7 @@ pub(crate) const RATCHETING: CauseSpec = CauseSpec {
     laws: |on| ratcheting(on).into_iter().collect(),
     simulated: |_, p| {
         let jump = Jump { time_s: [p(Name::TimeS); 3], height_arcsec: p(Name::JumpArcsec) };
-        skipped_teeth(vec![jump], 1.0).with(&[], [(JUMP, 1.0)])
+        skipped_teeth(vec![jump], 1.0).with(p, &[], [(JUMP, 1.0)])
     },
     ..plain()
 };

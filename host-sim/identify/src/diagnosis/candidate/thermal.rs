@@ -189,7 +189,7 @@ pub(crate) const THERMAL_CLEARANCE: CauseSpec = CauseSpec {
     },
     simulated: |on, p| {
         let lag = (Name::LagS, p(Name::LagS).max(LEAST_LAG_S));
-        thermal_clearance(on).with(&[lag], [(Tag::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
+        thermal_clearance(on).with(p, &[lag], [(Tag::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
     },
     ..plain()
 };
@@ -204,7 +204,7 @@ pub(crate) const THERMAL_STIFFNESS: CauseSpec = CauseSpec {
     place: |placing| placing.set_stiffness_per_k(),
     parameters: &[number(Name::StiffnessRelativePerK, "of the stiffness", -0.02, 0.02, Value(-0.004))],
     laws: |_| vec![thermal_stiffness()],
-    simulated: |_, p| thermal_stiffness().with(&[], [(Tag::SIZE, -100.0 * p(Name::StiffnessRelativePerK))]),
+    simulated: |_, p| thermal_stiffness().with(p, &[], [(Tag::SIZE, -100.0 * p(Name::StiffnessRelativePerK))]),
     ..plain()
 };
 
@@ -223,9 +223,6 @@ pub(crate) const LUBRICANT_VISCOSITY: CauseSpec = CauseSpec {
         number(Name::RelativeDragPerK, "of the drag", -0.15, 0.0, Value(-0.035)),
     ],
     laws: |on| vec![lubricant_viscosity(on)],
-    simulated: |on, p| {
-        let [drag, power] = [Name::DragNM, Name::SpeedExponent].map(|name| (name, p(name)));
-        lubricant_viscosity(on).with(&[drag, power, (Name::PerK, -p(Name::RelativeDragPerK))], [])
-    },
+    simulated: |on, p| lubricant_viscosity(on).with(p, &[(Name::PerK, -p(Name::RelativeDragPerK))], []),
     ..plain()
 };
