@@ -10,10 +10,9 @@ pub(crate) mod spec;
 use std::str::FromStr;
 
 use serde::Serialize;
-use thiserror::Error;
 
 use crate::diagnosis::candidate::{dynamic, geometry, lobes, sensor, stiffness, thermal};
-use flexspline_base::suggest::did_you_mean;
+use crate::synthesize::EffectError;
 pub use parameter::{Factor, Kind, ParameterName, ParameterSpec, TIME, Usual, number};
 use spec::CauseSpec;
 pub(crate) use spec::OF_THE_OUTPUT_ENCODER;
@@ -165,23 +164,12 @@ pub(crate) enum InTable {
     No(&'static str),
 }
 
-/// No cause has this name.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error(
-    "found \"{found}\"{}; allowed: {}",
-    did_you_mean("; ", found, CauseName::ALL.iter().map(|cause| cause.as_str())),
-    CauseName::ALL.iter().map(|cause| cause.as_str()).collect::<Vec<_>>().join(", ")
-)]
-pub struct UnknownCause {
-    /// The name found.
-    pub found: String,
-}
-
 impl FromStr for CauseName {
-    type Err = UnknownCause;
-    fn from_str(name: &str) -> Result<CauseName, UnknownCause> {
+    type Err = EffectError;
+    fn from_str(name: &str) -> Result<CauseName, EffectError> {
         let known = CauseName::ALL.iter().find(|cause| cause.as_str() == name);
-        known.copied().ok_or_else(|| UnknownCause { found: name.to_owned() })
+        let allowed = || CauseName::ALL.map(CauseName::as_str);
+        known.copied().ok_or_else(|| EffectError::unknown("found ", name, &allowed()))
     }
 }
 

@@ -95,7 +95,7 @@ impl EffectError {
     }
 
     /// A name that is none of those `allowed`, with the one that may be meant.
-    fn unknown(what: &str, found: &str, allowed: &[&str]) -> EffectError {
+    pub(crate) fn unknown(what: &str, found: &str, allowed: &[&str]) -> EffectError {
         let hint = did_you_mean("; ", found, allowed.iter().copied());
         let allowed = if allowed.is_empty() { "no parameter".to_owned() } else { allowed.join(", ") };
         EffectError(format!("{what}\"{found}\"{hint}; allowed: {allowed}"))
