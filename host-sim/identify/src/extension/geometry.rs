@@ -92,8 +92,8 @@ pub(crate) struct Placing<'a> {
     nominal: &'a Nominal,
     cause: &'a CauseEntry,
     probe: &'a Probe,
-    /// Which of the causes of the probe it is, if it is one.
-    at: Option<usize>,
+    /// Which of the causes of the probe it is.
+    at: usize,
     /// Whether the drive stays at one angle against gravity.
     at_one_orientation: bool,
     /// The fields that were set, `path = value`.
@@ -132,9 +132,8 @@ impl Placing<'_> {
         radius_mm: f64,
         [size, phase]: [&str; 2],
     ) {
-        let Some(at) = self.at else { return };
         let flank_angle_rad = self.drive.circular_spline.bearing_flank_angle_rad();
-        let wave = read(self.probe.wave(at, on_circular_spline, 2.0), flank_angle_rad);
+        let wave = read(self.probe.wave(self.at, on_circular_spline, 2.0), flank_angle_rad);
         self.set(size, |_| rounded(um(wave.norm(), radius_mm)));
         self.set(phase, |_| rounded(degrees(0.5 * wave.arg())));
     }
@@ -161,7 +160,6 @@ impl Placing<'_> {
 
     /// Harmonics of the pitch of a wheel.
     pub(crate) fn set_pitch_harmonics(&mut self, wheel: Wheel) {
-        let Some(at) = self.at else { return };
         let on_circular_spline = wheel == Wheel::CircularSpline;
         let (f, c, built) = (&self.drive.flexspline, &self.drive.circular_spline, &mut self.found.as_built);
         let (field, list, radius, sign) = if on_circular_spline {
@@ -173,7 +171,7 @@ impl Placing<'_> {
         };
         // Two lobes that share the load alike cancel odd orders; their size says nothing of the wheel.
         for order in [2_u32, 4, 6] {
-            let [plus, minus] = self.probe.wave(at, on_circular_spline, f64::from(order));
+            let [plus, minus] = self.probe.wave(self.at, on_circular_spline, f64::from(order));
             let wave = (plus + minus) * (0.5 * sign);
             let amplitude_um = rounded(um(wave.norm(), radius));
             if amplitude_um >= 0.1 {
@@ -188,7 +186,6 @@ impl Placing<'_> {
 
     /// A damaged tooth, on the flanks on which the data show it.
     pub(crate) fn set_damaged_tooth(&mut self) {
-        let Some(at) = self.at else { return };
         let [tooth, wheel, depth] = [Name::Tooth, Name::Wheel, Name::DepthUm].map(|name| self.value(name));
         let (Some(tooth), Some(wheel), Some(depth)) = (tooth, wheel, depth) else { return };
         let (wheel, teeth) = match wheel < 0.5 {
@@ -196,8 +193,9 @@ impl Placing<'_> {
             false => (Wheel::CircularSpline, self.drive.circular_spline.teeth),
         };
         // Under a positive load the clockwise flanks of the flexspline bear, and the others of the circular spline.
-        let felt = [0, 1]
-            .map(|flank: usize| self.probe.error[flank][at].iter().fold(0.0, |most: f64, error| most.max(error.abs())));
+        let felt = [0, 1].map(|flank: usize| {
+            self.probe.error[flank][self.at].iter().fold(0.0, |most: f64, error| most.max(error.abs()))
+        });
         let flank = match (felt[0] > felt[1]) == (wheel == Wheel::Flexspline) {
             _ if felt[0].min(felt[1]) > 0.5 * felt[0].max(felt[1]) => DamagedFlank::Both,
             true => DamagedFlank::Minus,
@@ -291,7 +289,10 @@ pub(crate) fn found_geometry(
     let mut found = drive.clone();
     let (mut fields, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
-        let at = extended.causes().iter().position(|fitted| fitted.name() == cause.name);
+        let Some(at) = extended.causes().iter().position(|fitted| fitted.name() == cause.name) else {
+            rest.push(cause.clone());
+            continue;
+        };
         let mut placing = Placing {
             drive,
             found: &mut found,
