@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flexspline::Table;
 use serde::{Deserialize, Serialize};
 
+use super::candidate::geometry::Angle;
 use super::channels::waves;
 use super::flank_lag::{behind, flank_lag};
 use super::rows::Rows;
@@ -102,12 +103,12 @@ type Pair = Arc<[Vec<f64>; 2]>;
 
 /// Cosines and sines of angles that many laws share, made when first asked for.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Waves(Arc<Mutex<HashMap<(i8, u64), Pair>>>);
+pub(crate) struct Waves(Arc<Mutex<HashMap<(Angle, u64), Pair>>>);
 
 impl Waves {
-    /// Cosine and sine of `order` times the angle called `which`.
-    pub fn of(&self, which: i8, order: f64, make: impl FnOnce() -> [Vec<f64>; 2]) -> Pair {
-        let key = (which, order.to_bits());
+    /// Cosine and sine of `order` times an angle.
+    pub fn of(&self, angle: Angle, order: f64, make: impl FnOnce() -> [Vec<f64>; 2]) -> Pair {
+        let key = (angle, order.to_bits());
         let known = |waves: &Waves| waves.0.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
         if let Some(pair) = known(self) {
             return pair;

@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, faded, half_load, kept, sense, waves, weighted_waves};
 use super::{
-    Coefficients, Excitation, Law, Named, Regressor, Shape, Shaped, Tag, Zones, by_row, main, main_about, nuisance,
+    Coefficients, Excitation, Law, Regressor, Shape, Shaped, Tag, Zones, by_row, directed, main, main_about, nuisance,
     of_both, polar, times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
@@ -157,11 +157,8 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
     )
     .parameters_by(move |on, shape, c| {
         let amplitude = second_order_unloaded(c, shape, by) / SECOND_ORDER;
-        let mut named: Vec<Named> = vec![
-            (Name::AmplitudeUm, amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
-            (Name::AmplitudeArcsec, amplitude),
-            (Name::PhaseRad, shape.of(Name::PhaseRad)),
-        ];
+        let um = amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um;
+        let mut named = directed(um, amplitude, shape.of(Name::PhaseRad));
         named.extend([Name::HalfLoadNM, Name::PressedArcsec].into_iter().filter_map(|n| Some((n, shape.get(n)?))));
         named
     })

@@ -15,8 +15,8 @@ use flexspline::FixedMember;
 
 use super::displaced::displaced;
 use super::{
-    Coefficients, Excitation, Law, Named, Regressor, Shape, Simulated, Tag, Values, beside, by_row, kernel, main,
-    nuisance, of_both, of_wave, polar, times,
+    Coefficients, Excitation, Law, Named, Regressor, Shape, Simulated, Tag, Values, beside, by_row, directed, kernel,
+    main, nuisance, of_both, of_wave, polar, times,
 };
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
@@ -45,7 +45,7 @@ const TAKEN_UNDER_LIGHT_LOAD: Tag = Tag("clearance taken under light load");
 const PULSE: Tag = Tag("pulse");
 
 /// Which angle an error is locked to.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Angle {
     Generator,
     Output,
@@ -53,15 +53,6 @@ pub(crate) enum Angle {
     CircularSpline,
     /// Gravity as the wave sees it.
     Gravity,
-}
-
-impl From<Wheel> for Angle {
-    fn from(wheel: Wheel) -> Angle {
-        match wheel {
-            Wheel::Flexspline => Angle::Flexspline,
-            Wheel::CircularSpline => Angle::CircularSpline,
-        }
-    }
 }
 
 pub(super) fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
@@ -92,14 +83,7 @@ pub(super) fn weighted_waves(on: &Excitation<'_>, of: Angle, order: f64, weight:
 
 /// Cosine and sine of a multiple of an angle, made once.
 pub(super) fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc<[Vec<f64>; 2]> {
-    let which = match of {
-        Angle::Flexspline => 0,
-        Angle::CircularSpline => 1,
-        Angle::Gravity => 2,
-        Angle::Generator => 4,
-        Angle::Output => 5,
-    };
-    on.base.waves.of(which, order, || {
+    on.base.waves.of(of, order, || {
         let (sin, cos) = (0..on.rows.len()).map(|k| (order * angle(on, of, k)).sin_cos()).unzip();
         [cos, sin]
     })
@@ -124,7 +108,7 @@ fn load_shares(on: &Excitation<'_>) -> Vec<f64> {
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other
 /// flank of the circular spline, and what a flank is ahead by changes its sign.
 pub(super) fn sense(on: &Excitation<'_>) -> f64 {
-    if is_standing(on.nominal, Angle::CircularSpline) { -1.0 } else { 1.0 }
+    if standing(on.nominal) == Angle::CircularSpline { -1.0 } else { 1.0 }
 }
 
 /// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the
@@ -172,12 +156,9 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
 /// Of a wave of n periods in a turn of the wheel.
 fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> Vec<Named> {
     let (amplitude, phase) = of_wave(c, Tag::WAVE);
-    vec![
-        (Name::AmplitudeUm, amplitude / on.scales.arcsec_per_um),
-        (Name::AmplitudeArcsec, amplitude),
-        (Name::Harmonic, harmonic),
-        (Name::PhaseRad, phase / harmonic),
-    ]
+    let mut named = directed(amplitude / on.scales.arcsec_per_um, amplitude, phase / harmonic);
+    named.push((Name::Harmonic, harmonic));
+    named
 }
 
 /// Further harmonics that both lobes see alike, as jaws, screws or an indexing head with n places leave them; odd
@@ -185,12 +166,11 @@ fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> V
 const HIGHER_HARMONICS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
 
 /// The models of the pitch error of a wheel: the one by the kernels of the drive, where it has them.
-fn pitch_errors(cause: CauseName, wheel: Wheel, on: &Excitation<'_>) -> Vec<Law> {
+fn pitch_errors(cause: CauseName, (of, wheel): (Angle, Wheel), on: &Excitation<'_>) -> Vec<Law> {
     if let Some(kernels) = on.kernels() {
-        return vec![kernel::pitch(cause, wheel, kernels)];
+        return vec![kernel::pitch(cause, (of, wheel), kernels)];
     }
-    let of = Angle::from(wheel);
-    let of_encoder = |harmonic: f64| is_standing(on.nominal, of) && super::sensor::is_subdivision(harmonic);
+    let of_encoder = |harmonic: f64| of == standing(on.nominal) && super::sensor::is_subdivision(harmonic);
     let higher = HIGHER_HARMONICS.into_iter().filter(|harmonic| !of_encoder(*harmonic));
     std::iter::once(pitch(cause, of)).chain(higher.map(|harmonic| higher_harmonic(cause, of, harmonic))).collect()
 }
@@ -223,21 +203,20 @@ fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
     .of_shape()
 }
 
-/// Whether a wheel does not turn: what is cut into it comes back once in each turn of the generator.
-fn is_standing(nominal: &Nominal, of: Angle) -> bool {
+/// The wheel that does not turn: what is cut into it comes back once in each turn of the generator.
+fn standing(nominal: &Nominal) -> Angle {
     match nominal.teeth.map(|teeth| teeth.fixed) {
-        Some(FixedMember::CircularSpline) => of == Angle::CircularSpline,
-        _ => of == Angle::Flexspline,
+        Some(FixedMember::CircularSpline) => Angle::CircularSpline,
+        _ => Angle::Flexspline,
     }
 }
 
 /// The pitch error of the wheel that stands.
 #[must_use]
 pub(crate) fn standing_pitch_error(nominal: &Nominal) -> CauseName {
-    if is_standing(nominal, Angle::Flexspline) {
-        CauseName::FlexsplinePitchError
-    } else {
-        CauseName::CircularSplinePitchError
+    match standing(nominal) {
+        Angle::CircularSpline => CauseName::CircularSplinePitchError,
+        _ => CauseName::FlexsplinePitchError,
     }
 }
 
@@ -272,11 +251,7 @@ fn ovality() -> Law {
         // sin 2(x - c) = cos 2c sin 2x - sin 2c cos 2x.
         let [of_sine, of_cosine] = c.wave(Tag::WAVE);
         let (amplitude, phase) = polar(of_sine, -of_cosine);
-        vec![
-            (Name::AmplitudeUm, amplitude / (0.67 * on.scales.arcsec_per_um)),
-            (Name::AmplitudeArcsec, amplitude),
-            (Name::PhaseRad, 0.5 * phase),
-        ]
+        directed(amplitude / (0.67 * on.scales.arcsec_per_um), amplitude, 0.5 * phase)
     })
     .well_known()
     .of_shape()
@@ -309,11 +284,7 @@ fn cam_form_error() -> Law {
     .parameters_by(|on, _, c| {
         let (both, phase) = of_wave(c, Tag::WAVE);
         let mesh = both.hypot(of_wave(c, WAVE_BY_FLANK).0);
-        vec![
-            (Name::AmplitudeUm, mesh / on.scales.arcsec_per_um),
-            (Name::AmplitudeArcsec, mesh),
-            (Name::PhaseRad, phase),
-        ]
+        directed(mesh / on.scales.arcsec_per_um, mesh, phase)
     })
     .of_shape()
 }
@@ -460,7 +431,7 @@ pub(crate) const FLEXSPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
     words: "pitch error of the flexspline",
     does: "teeth out of place: whole orders of the generator turn",
     place: |placing| placing.set_pitch_harmonics(Wheel::Flexspline),
-    laws: |on| pitch_errors(CauseName::FlexsplinePitchError, Wheel::Flexspline, on),
+    laws: |on| pitch_errors(CauseName::FlexsplinePitchError, (Angle::Flexspline, Wheel::Flexspline), on),
     simulated: |_, p| simulated_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, p),
     ..PITCH_ERROR
 };
@@ -471,7 +442,7 @@ pub(crate) const CIRCULAR_SPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
     words: "pitch error of the circular spline",
     does: "teeth out of place: whole orders of a turn against the circular spline",
     place: |placing| placing.set_pitch_harmonics(Wheel::CircularSpline),
-    laws: |on| pitch_errors(CauseName::CircularSplinePitchError, Wheel::CircularSpline, on),
+    laws: |on| pitch_errors(CauseName::CircularSplinePitchError, (Angle::CircularSpline, Wheel::CircularSpline), on),
     simulated: |_, p| simulated_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, p),
     ..PITCH_ERROR
 };

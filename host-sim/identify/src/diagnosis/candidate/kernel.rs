@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::displaced::SCALE_MISFIT;
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle, waves, weighted_waves};
-use super::{Excitation, Law, Regressor, Shape, Tag, beside, by_row, main, main_about, nuisance, of_wave};
+use super::{Excitation, Law, Regressor, Shape, Tag, beside, by_row, directed, main, main_about, nuisance, of_wave};
 use crate::causes::{CauseName, Kin, ParameterName as Name};
 use flexspline_design::kernels::{Gain, Kernels};
 use flexspline_mechanics::drive::Wheel;
@@ -87,22 +87,18 @@ pub(super) fn eccentric(cause: CauseName, of: Angle, kernels: &Arc<Kernels>) -> 
     ])
     .parameters_by(|on, shape, c| {
         let size = shape.of(Name::SizeUm) * c.of(Tag::SIZE);
-        vec![
-            (Name::AmplitudeUm, size),
-            (Name::AmplitudeArcsec, size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
-            (Name::PhaseRad, shape.of(Name::PhaseRad)),
-        ]
+        directed(size, size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE, shape.of(Name::PhaseRad))
     })
     .physical_if(|_, c| c.of(Tag::SIZE) > 0.5);
     by_kernels(law)
 }
 
 /// Harmonics of the pitch of a wheel that both lobes see alike; the odd ones cancel.
-pub(super) fn pitch(cause: CauseName, wheel: Wheel, kernels: &Arc<Kernels>) -> Law {
+pub(super) fn pitch(cause: CauseName, (of, wheel): (Angle, Wheel), kernels: &Arc<Kernels>) -> Law {
     /// Even orders of the pitch of a wheel. *Guess*: those beyond are small, as a zone of engaged teeth averages over
     /// them.
     const ORDERS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
-    let (of, kernels) = (Angle::from(wheel), Arc::clone(kernels));
+    let kernels = Arc::clone(kernels);
     let mut law = Law::new(cause, move |on, _| {
         let mut columns: Vec<Regressor> = Vec::new();
         for order in ORDERS {
@@ -119,12 +115,9 @@ pub(super) fn pitch(cause: CauseName, wheel: Wheel, kernels: &Arc<Kernels>) -> L
     })
     .parameters_by(|on, _, c| {
         let (amplitude, phase) = of_wave(c, Tag::WAVE);
-        vec![
-            (Name::AmplitudeUm, amplitude),
-            (Name::AmplitudeArcsec, amplitude * on.scales.arcsec_per_um),
-            (Name::Harmonic, 2.0),
-            (Name::PhaseRad, 0.5 * phase),
-        ]
+        let mut named = directed(amplitude, amplitude * on.scales.arcsec_per_um, 0.5 * phase);
+        named.push((Name::Harmonic, 2.0));
+        named
     });
     law.search.whole_beside_noise = true;
     by_kernels(law)
@@ -140,11 +133,7 @@ pub(super) fn ovality(kernels: &Arc<Kernels>) -> Law {
     })
     .parameters_by(|on, _, c| {
         let (amplitude, phase) = of_wave(c, Tag::WAVE);
-        vec![
-            (Name::AmplitudeUm, amplitude),
-            (Name::AmplitudeArcsec, amplitude * 0.67 * on.scales.arcsec_per_um),
-            (Name::PhaseRad, 0.5 * phase),
-        ]
+        directed(amplitude, amplitude * 0.67 * on.scales.arcsec_per_um, 0.5 * phase)
     });
     by_kernels(law)
 }

@@ -8,7 +8,7 @@
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
 use super::geometry::{Angle, OF_WHEELS, USUAL_ARCSEC, crest_at, kept, waves, weighted_waves};
 use super::{
-    Excitation, Law, Named, Regressor, Shape, Shaped, Simulated, Tag, Values, beside, by_row, main, main_about,
+    Excitation, Law, Regressor, Shape, Shaped, Simulated, Tag, Values, beside, by_row, directed, main, main_about,
     nuisance, of_wave, times,
 };
 use crate::causes::ParameterName as Name;
@@ -103,11 +103,7 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     .parameters_by(|on, shape, c| {
         let [(on_flexspline, phase), (on_ring, _)] = TEETH.map(|(_, role)| of_wave(c, role));
         let strongest = on_flexspline.max(on_ring);
-        let mut named: Vec<Named> = vec![
-            (Name::AmplitudeUm, strongest / on.scales.arcsec_per_um),
-            (Name::AmplitudeArcsec, strongest),
-            (Name::PhaseRad, phase),
-        ];
+        let mut named = directed(strongest / on.scales.arcsec_per_um, strongest, phase);
         let deeper = [Name::DeeperArcsec, Name::PressedArcsec];
         named.extend(deeper.into_iter().filter_map(|name| Some((name, shape.get(name)?))));
         named

@@ -694,6 +694,12 @@ fn polar(c: f64, s: f64) -> (f64, f64) {
     (c.hypot(s), s.atan2(c))
 }
 
+/// The parameters of what has a size, in micrometres and at the output, and a direction.
+fn directed(um: f64, arcsec: f64, phase_rad: f64) -> Vec<Named> {
+    use ParameterName as Name;
+    vec![(Name::AmplitudeUm, um), (Name::AmplitudeArcsec, arcsec), (Name::PhaseRad, phase_rad)]
+}
+
 /// Amplitude and phase of a wave by its coefficients.
 fn of_wave(c: Coefficients<'_>, role: Tag) -> (f64, f64) {
     let [cos, sin] = c.wave(role);

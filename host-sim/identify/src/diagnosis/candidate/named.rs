@@ -43,16 +43,10 @@ impl<'c> Coefficients<'c> {
         self.roles.iter().zip(self.values).filter(move |(r, _)| **r == role).map(|(_, c)| *c)
     }
 
-    /// That of the first column of a role; none where the law has no such column here.
-    #[must_use]
-    pub fn get(self, role: Tag) -> Option<f64> {
-        self.all(role).next()
-    }
-
     /// That of the first column of a role. What has no column adds nothing: 0.
     #[must_use]
     pub fn of(self, role: Tag) -> f64 {
-        self.get(role).unwrap_or(0.0)
+        self.all(role).next().unwrap_or(0.0)
     }
 
     /// Root mean square of the part of the first column of a role, without a sign: 0 where the law has no such column
@@ -122,7 +116,7 @@ mod tests {
             let c = Coefficients::new(&roles, &values);
             assert_eq!(c.wave(wave), [1.0, 2.0]);
             assert_eq!(c.of(Tag::SIZE), if roles[0] == Tag::SIZE { 7.0 } else { 3.0 });
-            assert_eq!((c.get(Tag("none")), c.of(Tag("none")), c.wave(Tag("none"))), (None, 0.0, [0.0; 2]));
+            assert_eq!((c.of(Tag("none")), c.wave(Tag("none"))), (0.0, [0.0; 2]));
         }
     }
 
