@@ -205,20 +205,16 @@ fn backlash_growth() -> Law {
     law
 }
 
-/// A clearance that widens during the data, with the time or with the travel of the generator.
-fn wear(timed: bool) -> Law {
-    Law::new(CauseName::Wear, move |on, shape| {
-        let rows = on.rows;
+/// A clearance that widens during the data, with the travel of the generator.
+fn wear() -> Law {
+    Law::new(CauseName::Wear, |on, shape| {
+        let travel = &on.rows.travel;
         let travelled = |sum: &mut f64, k: usize| {
-            *sum += (rows.travel[k] - rows.travel[k.saturating_sub(1)]).max(0.0);
+            *sum += (travel[k] - travel[k.saturating_sub(1)]).max(0.0);
             Some(*sum)
         };
-        let (done, all): (Vec<f64>, f64) = if timed {
-            (by_row(on, |k| (rows.time[k] - on.scales.begin_s).max(0.0)), on.scales.duration_s)
-        } else {
-            ((0..rows.len()).scan(0.0, travelled).collect(), on.scales.travel)
-        };
-        let all = all.max(1e-12);
+        let done: Vec<f64> = (0..travel.len()).scan(0.0, travelled).collect();
+        let all = on.scales.travel.max(1e-12);
         let exponent = shape.of(Name::Exponent);
         let widened = |k: usize| (done[k] / all).powf(exponent);
         vec![
@@ -352,13 +348,10 @@ pub(crate) const WEAR: CauseSpec = CauseSpec {
     place: |placing| placing.set_wear(),
     parameters: &[number(Name::GrowthArcsec, "whole width, first row to last", 0.0, 10_000.0, Value(40.0))],
     laws: |on| {
-        let timed = on.rows.recorded.time;
-        let mut laws = vec![wear(false).variant("travel")];
-        laws.extend(timed.then(|| wear(true).variant("time")));
-        laws.extend(wear_between_sessions(on).filter(|_| timed));
-        laws
+        let between = wear_between_sessions(on).filter(|_| on.rows.recorded.time);
+        std::iter::once(wear().variant("travel")).chain(between).collect()
     },
-    simulated: |_, p| wear(false).with(p, &[(Name::Exponent, 1.0)], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec))]),
+    simulated: |_, p| wear().with(p, &[(Name::Exponent, 1.0)], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec))]),
     ..plain()
 };
 
