@@ -48,8 +48,6 @@ const EARLIER_SPRING: Tag = Tag("spring that slips earlier");
 const LATER_SPRING: Tag = Tag("spring that slips later");
 const EARLIER: f64 = 0.35;
 const LATER: f64 = 2.5;
-/// Share by which a loop may be wider under load of one sign. Guess.
-const WIDER_ONE_WAY: f64 = 0.2;
 /// Wear that grows faster than the law says.
 const FASTER: Tag = Tag("faster");
 /// A jump by whole teeth.
@@ -76,7 +74,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         let slip = shape.of(Name::SlipTorqueNM);
         let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
-        let mut columns = vec![
+        vec![
             // The opening is a share of the wind-up: a plastic gear's is wide, a steel drive's at rated load 0.5 to 2'
             // of 3'.
             main(negative(stop_operator(on, slip)), usual).called(SPRING),
@@ -84,12 +82,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
             nuisance(negative(stop_operator(on, LATER * slip)), 0.5).called(LATER_SPRING),
             nuisance(by_row(on, |k| load_share(on, k)), 0.25),
             nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
-        ];
-        // A loop may be wider one way than the other.
-        let wider = stop_operator(on, slip).into_iter().map(f64::abs).collect();
-        columns.push(nuisance(wider, WIDER_ONE_WAY));
-        columns.push(nuisance(by_row(on, |k| load_share(on, k).abs()), WIDER_ONE_WAY));
-        columns
+        ]
     })
     .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
     .parameters_by(move |_, shape, c| {
