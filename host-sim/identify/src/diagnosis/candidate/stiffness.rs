@@ -134,46 +134,30 @@ fn stiffness_error() -> Law {
     law
 }
 
-/// Share by which the law of a cracked root may be wrong in each of three ways: a crack that opens bends more than one
-/// that is pressed shut, the two loaded zones may carry unequally, and the arc in which the tooth carries has another
-/// shape. *Guess*.
+/// Share by which the law of a cracked root may be wrong in either of two ways: a crack that opens bends more than one
+/// that is pressed shut, and the two loaded zones may carry unequally. *Guess*.
 const OTHER_CRACK: f64 = 0.3;
-/// The arc of another shape, over that of the law. *Guess*.
-const BROADER: f64 = 1.7;
-const BROADER_ARC: Tag = Tag("broader arc");
-
 /// A tooth of the circular spline that is cracked at its root: the drive winds up more, both ways, while a loaded zone
 /// is on it, twice in a turn of the wave on that wheel. Without load it is where it was.
 fn cracked_tooth_root() -> Law {
     const WHEEL: Angle = Angle::CircularSpline;
     Law::new(CauseName::CrackedToothRoot, |on, shape| {
         let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));
-        let softer = |width: f64| by_row(on, |k| load_share(on, k) * pulse(angle(on, WHEEL, k) - place, width));
-        let size = softer(width);
+        let size = by_row(on, |k| load_share(on, k) * pulse(angle(on, WHEEL, k) - place, width));
         let opening = size.iter().map(|v| v.abs()).collect();
         let lobe = by_row(on, |k| size[k] * (angle(on, WHEEL, k) - place).cos().signum());
-        vec![
-            main(size, 30.0).called(Tag::SIZE),
-            nuisance(opening, OTHER_CRACK),
-            nuisance(lobe, OTHER_CRACK),
-            nuisance(softer(BROADER * width), OTHER_CRACK).called(BROADER_ARC),
-        ]
+        vec![main(size, 30.0).called(Tag::SIZE), nuisance(opening, OTHER_CRACK), nuisance(lobe, OTHER_CRACK)]
     })
     .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
     .parameters_by(|on, shape, c| {
-        // Both arcs have their top where the tooth is. Together they are as wide as the bell curve of that height and
-        // area.
-        let (narrow, broad) = (c.of(Tag::SIZE), c.of(BROADER_ARC));
-        let top = narrow + broad;
-        let width = shape.of(Name::WidthRad) * (narrow + BROADER * broad) / top;
         vec![
-            (Name::AmplitudeArcsec, top),
+            (Name::AmplitudeArcsec, c.of(Tag::SIZE)),
             (Name::FullLoadNM, on.scales.load),
             (Name::AngleRad, shape.of(Name::AngleRad)),
-            (Name::WidthRad, width),
+            (Name::WidthRad, shape.of(Name::WidthRad)),
         ]
     })
-    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0 && c.of(Tag::SIZE) + BROADER * c.of(BROADER_ARC) > 0.0)
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
     .well_known()
 }
 
