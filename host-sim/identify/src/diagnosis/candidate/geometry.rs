@@ -311,21 +311,15 @@ fn damaged_tooth(of: Angle) -> Law {
         let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));
         let load = if on.scales.load > 0.0 { on.scales.load } else { 1.0 };
         let pulse = by_row(on, |k| pulse(angle(on, of, k) - place, width));
-        // The two lobes meet the tooth half a turn apart and may share the load unequally.
-        let (first, (sin, cos)) = (kept(on, of, 1.0), place.sin_cos());
-        let lobe = of_both(&first[0], &first[1], |c, s| (c * cos + s * sin).signum());
         let by_load = of_both(&pulse, &on.rows.torque, |pulse, torque| pulse * torque / load);
         let by_flank = times(&pulse, &on.base.flank);
-        let of_lobe = [&by_flank, &by_load, &pulse].map(|column| nuisance(times(column, &lobe), 1.0));
         let of_load = by_load.iter().map(|v| v.abs()).collect();
-        let mut columns = vec![
+        vec![
             main(by_flank, 30.0).called(PULSE),
             main(by_load, 30.0).called(PULSE),
             main(pulse, 20.0).called(PULSE),
             main(of_load, 20.0).called(PULSE),
-        ];
-        columns.extend(of_lobe);
-        columns
+        ]
     })
     .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, WIDEST_PULSE, 2)])
     // What would be wider still is a wave, of the stiffness or of many teeth.
