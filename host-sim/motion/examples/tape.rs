@@ -3,15 +3,16 @@
 
 use std::path::PathBuf;
 
-use flexspline::{Drive, FixedMember};
-use flexspline_motion::dish;
 use flexspline_motion::flight::{OneJoint, table_image};
 use flexspline_motion::on_board::{HASH_START, LINE_TICKS, hashed, line};
 use flexspline_motion::scenario::{Scenario, TorqueKnown};
 
+#[path = "../tests/dish/mod.rs"]
+mod dish;
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("tape FOLDER")?);
-    let unit = dish::unit(Drive::new(188, 190, FixedMember::Flexspline).map_err(|error| error.to_string())?);
+    let unit = dish::unit();
     let image = table_image(&dish::scenario(), &unit, |_| *b"thejoint")?;
     std::fs::write(folder.join("joint.fxt"), &image)?;
     let mut lines = String::new();

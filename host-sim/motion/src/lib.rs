@@ -6,7 +6,6 @@
 //! `tests/firmware` compiles [`on_board`] for the target, and flies there the tapes of flights on this machine.
 #![forbid(unsafe_code)]
 
-pub mod dish;
 pub mod flight;
 pub mod friction;
 pub mod gear;

@@ -2,11 +2,12 @@
 //! servos, and what is known of the torque.
 
 use flexspline::{Drive, FixedMember};
-use flexspline_motion::dish;
 use flexspline_motion::flight::{ARCSEC_PER_RAD, JointUnit, comes_to_rest};
 use flexspline_motion::gear::SampledSpring;
 use flexspline_motion::scenario::{Load, Scenario, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
+
+mod dish;
 
 /// With a wind-up that begins with this compliance, arcsec for each N·m.
 fn unit(arcsec_n_m: f64) -> JointUnit {

@@ -1,13 +1,10 @@
 //! Flights with drives by a law: what the core gains on a unit that its table does not know, in motion.
 
-use flexspline::{Drive, FixedMember};
-use flexspline_motion::dish::{self, scenario};
-use flexspline_motion::flight::{COMPENSATED, Flown, JointUnit, fly_one};
+use flexspline_motion::flight::{COMPENSATED, Flown, fly_one};
 use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown};
 
-fn unit() -> JointUnit {
-    dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap())
-}
+mod dish;
+use dish::{scenario, unit};
 
 fn alone(scenario: &Scenario, kind: usize) -> Flown {
     fly_one(scenario, &unit(), kind).unwrap()

@@ -1,14 +1,10 @@
 //! Loads about zero, where the drag decides which flank carries: the core is never worse than no compensation, and near
 //! the ideal.
 
-use flexspline::{Drive, FixedMember};
-use flexspline_motion::dish;
 use flexspline_motion::flight::{COMPENSATED, IDEAL, JointUnit, fly_one};
 use flexspline_motion::scenario::{Leg, Load, Scenario, TorqueKnown};
 
-fn unit() -> JointUnit {
-    dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap())
-}
+mod dish;
 
 /// To and fro, quickly and slowly, under a constant load.
 fn calm(load_n_m: f64, drag_n_m: f64, noise_n_m: f64, torque: TorqueKnown) -> Scenario {
@@ -37,7 +33,7 @@ const FLOATS_N_M: f64 = 0.06;
 #[test]
 #[ignore = "long: tests/run slow"]
 fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ideal() {
-    let unit = unit();
+    let unit = dish::unit();
     let mut worst = [(0.0_f64, String::new()), (0.0, String::new())];
     let mut flights = 0;
     let long = std::env::var_os("FLEXSPLINE_LONG").is_some();

@@ -1,10 +1,10 @@
 //! Without a torque sensor: the torque from the motor's current, and the bound that is stated with it.
 
-use flexspline::{Drive, FixedMember};
-use flexspline_motion::dish;
 use flexspline_motion::flight::{COMPENSATED, fly_one};
 use flexspline_motion::scenario::{Leg, Load, Scenario, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
+
+mod dish;
 
 fn flights() -> Vec<(&'static str, Scenario)> {
     let base = Scenario { torque: TorqueKnown::Current, ..dish::scenario() };
@@ -65,7 +65,7 @@ fn flights() -> Vec<(&'static str, Scenario)> {
 /// less, and never loses. `FLEXSPLINE_LONG` draws the noise twice.
 #[test]
 fn the_bound_holds_and_the_core_gains_without_a_torque_sensor() {
-    let unit = dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap());
+    let unit = dish::unit();
     let long = std::env::var_os("FLEXSPLINE_LONG").is_some();
     let mut least = 1.0_f64;
     for (name, scenario) in flights() {

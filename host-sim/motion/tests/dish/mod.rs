@@ -2,16 +2,17 @@
 
 use core::f64::consts::TAU;
 
-use flexspline::Drive;
+use flexspline::{Drive, FixedMember};
+use flexspline_motion::flight::{ARCSEC_PER_RAD, JointUnit};
+use flexspline_motion::gear::SampledSpring;
+use flexspline_motion::scenario::{Leg, Load, Scenario};
+use flexspline_motion::servo::ServoSettings;
 
-use super::flight::{ARCSEC_PER_RAD, JointUnit};
-use super::gear::SampledSpring;
-use super::scenario::{Leg, Load, Scenario};
-use super::servo::ServoSettings;
-
-/// A unit like HHD-95 with a double disc, with these tooth counts: 31″ of clearance to each side, wind-up that hardens,
+/// A unit like HHD-95 with a double disc: 31″ of clearance to each side, wind-up that hardens,
 /// a ripple of the tooth pitch.
-pub fn unit(drive: Drive) -> JointUnit {
+#[allow(dead_code, reason = "not every test flies it")]
+pub fn unit() -> JointUnit {
+    let drive = Drive::new(188, 190, FixedMember::Flexspline).expect("the teeth of HHD-95");
     let law = |phase: f64, flank: f64| {
         (31.0 + 1.1 * flank / (1.0 + 0.006 * flank) + 0.2 * libm::cos(TAU * phase)) / ARCSEC_PER_RAD
     };
