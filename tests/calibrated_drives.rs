@@ -27,7 +27,7 @@ use flexspline_identify::measurement::{ColumnMap, Recording, parse};
 use flexspline_mechanics::drive::{DamagedFlank, GeneratorKind, Wheel};
 
 use crate::fem_causes::known;
-use crate::plant_maps::{image, map};
+use crate::plant_maps::image;
 
 const RATIO: f64 = 95.0;
 const DRAG_N_M: f64 = 0.02;
@@ -453,7 +453,7 @@ fn left_by(image: &[u8], run: &Run, sensors: &Sensors) -> Vec<f64> {
 fn of_drive(seed: u64) -> Figures {
     let mut random = fastrand::Rng::with_seed(seed);
     let (errors, sensors) = (Errors::draw(&mut random), Sensors::draw(&mut random));
-    let (kernels, map, nominal) = (&known().1, map(GeneratorKind::Cam), image(GeneratorKind::Cam));
+    let (kernels, map, nominal) = (&known().1, GearMap::of(GeneratorKind::Cam), image(GeneratorKind::Cam));
     let unit = Unit::new(&errors, kernels, &map);
     let table = Table::check(&nominal).unwrap();
     let prior = Prior::of_table(&table, GeneratorKind::Cam);

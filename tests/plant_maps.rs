@@ -8,13 +8,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Method, Problem, SolverSettings};
 
-/// The map of a generator, by contact FEM.
-pub(crate) fn map(kind: GeneratorKind) -> GearMap {
-    let file = format!("{}/../host-sim/fly/plant/{kind}.csv", env!("CARGO_MANIFEST_DIR"));
-    GearMap::parse(&file, &std::fs::read_to_string(&file).unwrap()).unwrap()
-}
-
-/// Its table, of other contact FEM.
+/// The table of a generator, of other contact FEM than its map.
 pub(crate) fn image(kind: GeneratorKind) -> Vec<u8> {
     let file = format!("{}/firmware/samples/{kind}.samples.csv", env!("CARGO_MANIFEST_DIR"));
     let bytes = std::fs::read(&file).unwrap();
@@ -29,7 +23,7 @@ fn a_plant_map_is_what_contact_fem_says() {
         [(GeneratorKind::Cam, [0.5, 7.0, 90.0], 0.1), (GeneratorKind::TwoRoller, [0.3, 1.1, 9.0], 0.3)]
     {
         let (drive, temperature_c) = (Drive::hhd_95(), 29.0);
-        let wind_up = map(kind).at(temperature_c);
+        let wind_up = GearMap::of(kind).at(temperature_c);
         let problem = Problem::new(&drive, kind, temperature_c, settings).unwrap();
         let mut motion = Motion::deformed(&problem, 0.0).unwrap();
         let mut worst = 0.0_f64;
@@ -48,20 +42,4 @@ fn a_plant_map_is_what_contact_fem_says() {
         println!("{kind}: the map misses fresh FEM by {worst:.3}\" at most");
         assert!(worst < bound, "{kind}: {worst}");
     }
-}
-
-#[test]
-fn a_plant_map_is_read_as_it_was_written_and_a_damaged_one_says_where() {
-    let cam = map(GeneratorKind::Cam);
-    let text = cam.to_csv();
-    // A file has three digits of an arc-second.
-    assert_eq!(GearMap::parse("cam.csv", &text).unwrap().to_csv(), text);
-    let damaged =
-        |from: &str, to: &str| GearMap::parse("cam.csv", &text.replacen(from, to, 1)).unwrap_err().to_string();
-    assert!(damaged("teeth=", "tooth=").starts_with("cam.csv: line 1: "));
-    assert!(damaged("\n0,", "\ncold,").starts_with("cam.csv: line 3: "));
-    let short = text.rsplit_once('\n').and_then(|(text, _)| text.rsplit_once('\n')).unwrap().0;
-    let lines = short.lines().count();
-    let said = GearMap::parse("cam.csv", short).unwrap_err().to_string();
-    assert!(said.starts_with(&format!("cam.csv: line {lines}: ")), "{said}");
 }

@@ -213,7 +213,6 @@ pub use flexspline_identify::synthesize::{Synthesized, synthesize};
 pub use flexspline_fly::fly::{
     Flown, FlyError, Results, built_in as flight_named, read as read_flight, results as flight_results,
 };
-pub use flexspline_fly::plant_map::GearMap;
 
 // Hand it to other programs.
 pub use flexspline_export::bundle::Bundle;

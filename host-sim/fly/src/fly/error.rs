@@ -5,7 +5,6 @@ use flexspline_design::tables::TableError;
 use flexspline_motion::flight::FlightError;
 
 use super::OwnTableError;
-use crate::plant_map::MapError;
 
 /// A scenario that is refused, or one that cannot be flown.
 #[derive(Debug, thiserror::Error)]
@@ -26,9 +25,6 @@ pub enum FlyError {
     /// A table whose drive cannot be flown.
     #[error(transparent)]
     Table(#[from] OwnTableError),
-    /// The unit's map of the contact FEM.
-    #[error(transparent)]
-    Map(#[from] MapError),
     /// The core does not know the drive's teeth.
     #[error(transparent)]
     Teeth(#[from] TableError),

@@ -34,24 +34,13 @@ pub struct Flown {
     pub own: Option<OwnDrive>,
 }
 
-/// The maps of HHD-95 by contact FEM, at points that made no table (`examples/plant_maps.rs`).
-fn map(kind: GeneratorKind) -> &'static str {
-    match kind {
-        GeneratorKind::TwoRoller => include_str!("../../plant/two-roller.csv"),
-        GeneratorKind::FourRoller => include_str!("../../plant/four-roller.csv"),
-        GeneratorKind::DoubleDisc => include_str!("../../plant/double-disc.csv"),
-        GeneratorKind::Cam => include_str!("../../plant/cam.csv"),
-    }
-}
-
 /// A unit of HHD-95 with this generator at a temperature: wind-up, clearance and ripple of the contact FEM, and what
 /// was built otherwise.
 ///
 /// # Errors
-/// [`FlyError::Map`], [`FlyError::Teeth`].
+/// [`FlyError::Teeth`].
 pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<JointUnit, FlyError> {
-    let name = format!("{kind}.csv");
-    let map = GearMap::parse(&name, map(kind))?;
+    let map = GearMap::of(kind);
     let (teeth, wind_up) = (map.teeth, map.at(temperature_c));
     let law = |phase: f64, flank: f64| wind_up.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
     let drive = core_drive(&Drive::hhd_95())?;
