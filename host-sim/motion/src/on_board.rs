@@ -1,5 +1,5 @@
 //! A tick of a joint in firmware, from reading to command: the torque's path, rate and acceleration ahead,
-//! the joint. And a flight as a tape of the inputs of firmware, so that it can be flown again where nothing else runs.
+//! the joint. And what a flight gave in a few lines, to be compared where it is flown again.
 //! `no_std`: the firmware of `tests/firmware` is made of this file.
 
 use flexspline::{
@@ -120,109 +120,6 @@ pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
     const TICKS: f32 = 6.0;
     let pitches = rate_rad_s.abs() * drive.ratio().abs() * f32::from(drive.ripple_order()) / core::f32::consts::TAU;
     pitches * tick_s * TICKS <= 1.0
-}
-
-/// Bytes of the settings, and of a tick's inputs, on a tape.
-pub const SETTINGS_BYTES: usize = 4 * 15;
-/// See there.
-pub const TOLD_BYTES: usize = 8 + 8 + 4 * 4 + 4;
-
-impl OnBoardSettings {
-    /// For a tape, little endian.
-    #[must_use]
-    pub fn to_bytes(&self) -> [u8; SETTINGS_BYTES] {
-        let (l, t) = (&self.limits, &self.torque);
-        let numbers = [
-            l.tick_s,
-            l.rate_rad_s,
-            l.acceleration_rad_s2,
-            l.generator_rate_rad_s,
-            f32::from(l.debounce_ticks),
-            l.deadband_rad,
-            t.bandwidth_hz,
-            t.drag_n_m,
-            t.table_drag_n_m,
-            t.hold_n_m,
-            t.settle_s,
-            t.largest_n_m,
-            self.expected_n_m,
-            self.ahead_s,
-            self.temperature_c,
-        ];
-        let mut bytes = [0; SETTINGS_BYTES];
-        for (to, number) in bytes.chunks_exact_mut(4).zip(numbers) {
-            to.copy_from_slice(&number.to_le_bytes());
-        }
-        bytes
-    }
-
-    /// Of a tape.
-    #[must_use]
-    pub fn of_bytes(bytes: &[u8; SETTINGS_BYTES]) -> Self {
-        let mut numbers = bytes.as_chunks::<4>().0.iter().map(|number| f32::from_le_bytes(*number));
-        let mut next = || numbers.next().unwrap_or_default();
-        let limits = Limits {
-            tick_s: next(),
-            rate_rad_s: next(),
-            acceleration_rad_s2: next(),
-            generator_rate_rad_s: next(),
-            debounce_ticks: next() as u16,
-            deadband_rad: next(),
-        };
-        let torque = TorqueSettings {
-            tick_s: limits.tick_s,
-            bandwidth_hz: next(),
-            drag_n_m: next(),
-            table_drag_n_m: next(),
-            hold_n_m: next(),
-            settle_s: next(),
-            largest_n_m: next(),
-        };
-        Self { limits, torque, expected_n_m: next(), ahead_s: next(), temperature_c: next() }
-    }
-}
-
-impl OnBoardInput {
-    /// For a tape, little endian.
-    #[must_use]
-    pub fn to_bytes(&self) -> [u8; TOLD_BYTES] {
-        let (in_mesh, read) = match self.reading {
-            TorqueReading::OnLoad(torque) => (0, torque),
-            TorqueReading::InMesh(torque) => (1, torque),
-        };
-        let [rate, acceleration] = self.motion;
-        let mut bytes = [0; TOLD_BYTES];
-        let (angles, rest) = bytes.split_at_mut(16);
-        let (numbers, marks) = rest.split_at_mut(16);
-        let counts = [self.generator.counts(), self.target.counts()];
-        for (to, counts) in angles.chunks_exact_mut(8).zip(counts) {
-            to.copy_from_slice(&counts.to_le_bytes());
-        }
-        for (to, number) in numbers.chunks_exact_mut(4).zip([rate, acceleration, read, self.inertia_n_m]) {
-            to.copy_from_slice(&number.to_le_bytes());
-        }
-        marks.copy_from_slice(&[u8::from(self.direction == Direction::Backward), in_mesh, 0, 0]);
-        bytes
-    }
-
-    /// Of a tape.
-    #[must_use]
-    pub fn of_bytes(bytes: &[u8; TOLD_BYTES]) -> Self {
-        let words = bytes.as_chunks::<4>().0;
-        let number = |k: usize| f32::from_le_bytes(words.get(k).copied().unwrap_or_default());
-        let half = |k: usize| i64::from(u32::from_le_bytes(words.get(k).copied().unwrap_or_default()));
-        let counts = |k: usize| half(k) | half(k + 1) << 32;
-        let [backward, in_mesh, ..] = words.last().copied().unwrap_or_default();
-        let read = number(6);
-        Self {
-            generator: GeneratorAngle::from_counts(counts(0)),
-            target: OutputAngle::from_counts(counts(2)),
-            motion: [number(4), number(5)],
-            direction: if backward == 1 { Direction::Backward } else { Direction::Forward },
-            reading: if in_mesh == 1 { TorqueReading::InMesh(read) } else { TorqueReading::OnLoad(read) },
-            inertia_n_m: number(7),
-        }
-    }
 }
 
 /// All bits of what a tick gives into a running hash (FNV-1a, by words).

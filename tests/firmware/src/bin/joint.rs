@@ -6,41 +6,54 @@
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use flexspline::{Images, Store, Table};
+use flexspline::{
+    Direction, GeneratorAngle, Images, Limits, OutputAngle, Store, Table, TorqueReading, TorqueSettings,
+};
 use flexspline_firmware::on_board::{HASH_START, LINE_TICKS, OnBoard, OnBoardInput, OnBoardSettings, hashed, line};
 use flexspline_firmware::{Console, finish, twice};
 
 static IMAGE: [&[u8]; 2] = twice!(concat!(env!("FLEXSPLINE_TABLES"), "/joint.fxt"));
-static TAPES: [(&str, &[u8]); 2] = [
-    ("on_load", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/on_load.tape"))),
-    ("in_mesh", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/in_mesh.tape"))),
+/// Counts of generator and target, rate and acceleration of the target, whether it moves backward, whether the torque is
+/// that in the mesh, the torque, and that for the load's inertia.
+type Tick = (i64, i64, f32, f32, bool, bool, f32, f32);
+/// Name, settings of the core, and inputs of a flight.
+static TAPES: [(&str, OnBoardSettings, &[Tick]); 2] = [
+    include!(concat!(env!("FLEXSPLINE_TABLES"), "/on_load.rs")),
+    include!(concat!(env!("FLEXSPLINE_TABLES"), "/in_mesh.rs")),
 ];
 
 #[entry]
 fn main() -> ! {
     let Some(store) = cortex_m::singleton!(: Store = Store::new()) else { finish(false) };
-    for (name, tape) in TAPES {
+    for (name, settings, ticks) in TAPES {
         hprintln!("{}", name);
-        if fly(tape, store).is_none() {
+        if fly(settings, ticks, store).is_none() {
             finish(false);
         }
     }
     finish(true)
 }
 
-/// One tape; `None` if it or its table is not whole.
-fn fly(tape: &[u8], store: &mut Store) -> Option<()> {
+/// One tape; `None` if its table is not whole.
+fn fly(settings: OnBoardSettings, ticks: &[Tick], store: &mut Store) -> Option<()> {
     let [image, twin] = IMAGE;
-    let (settings, ticks) = tape.split_first_chunk()?;
-    let settings = OnBoardSettings::of_bytes(settings);
     let drive = *Table::check(image).ok()?.drive();
     let images = Images::new(image, twin);
     *store = Store::new();
     store.activate(&images, &drive, settings.temperature_c).ok()?;
     let mut on_board = OnBoard::new(drive, &settings).ok()?;
     let mut hash = HASH_START;
-    for (tick, bytes) in ticks.as_chunks().0.iter().enumerate() {
-        let given = on_board.tick(&images, store, &OnBoardInput::of_bytes(bytes));
+    for (tick, &(generator, target, rate, acceleration, backward, in_mesh, torque, inertia_n_m)) in ticks.iter().enumerate()
+    {
+        let input = OnBoardInput {
+            generator: GeneratorAngle::from_counts(generator),
+            target: OutputAngle::from_counts(target),
+            motion: [rate, acceleration],
+            direction: if backward { Direction::Backward } else { Direction::Forward },
+            reading: if in_mesh { TorqueReading::InMesh(torque) } else { TorqueReading::OnLoad(torque) },
+            inertia_n_m,
+        };
+        let given = on_board.tick(&images, store, &input);
         hash = hashed(hash, &given);
         if tick % LINE_TICKS == LINE_TICKS - 1 {
             line(&mut Console, tick, &given, hash).ok()?;
