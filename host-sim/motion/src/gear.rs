@@ -196,17 +196,6 @@ impl SampledSpring {
         (index, place - index as f64)
     }
 
-    /// Energies at the beginnings of intervals, from the torques.
-    fn sum_energies(&mut self) {
-        let mut energies = [0.0; CURVES];
-        for piece in &mut self.pieces {
-            for (curve, energy) in piece.iter_mut().zip(&mut energies) {
-                curve.energy = *energy;
-                *energy += self.width_rad * integral(&curve.torque, 1.0);
-            }
-        }
-    }
-
     /// At a twist of zero or more, the pitch turned by `(cos Zψ, sin Zψ)`.
     fn at(&self, twist: f64, pitch: (f64, f64)) -> Sprung {
         let (index, along) = self.place(twist);
@@ -260,15 +249,21 @@ fn pieces(nodes: &[[f64; CURVES]], width_rad: f64) -> Vec<[Piece; CURVES]> {
             }
         }
     };
-    let piece = |k: usize, curve: usize| {
+    let torque = |k: usize, curve: usize| {
         let (a, b) = (nodes[k][curve], nodes[k + 1][curve]);
         let (u, v) = (slope(k, curve), slope(k + 1, curve));
-        Piece { energy: 0.0, torque: [a, u, 3.0 * (b - a) - 2.0 * u - v, 2.0 * (a - b) + u + v] }
+        [a, u, 3.0 * (b - a) - 2.0 * u - v, 2.0 * (a - b) + u + v]
     };
-    let pieces = (0..nodes.len() - 1).map(|k| core::array::from_fn(|curve| piece(k, curve))).collect();
-    let mut sampled = SampledSpring { pieces, width_rad, teeth: 0.0 };
-    sampled.sum_energies();
-    sampled.pieces
+    let mut energies = [0.0; CURVES];
+    let interval = |k: usize| {
+        core::array::from_fn(|curve| {
+            let torque = torque(k, curve);
+            let energy = energies[curve];
+            energies[curve] += width_rad * integral(&torque, 1.0);
+            Piece { energy, torque }
+        })
+    };
+    (0..nodes.len() - 1).map(interval).collect()
 }
 
 fn cubic(c: &[f64; 4], x: f64) -> f64 {
@@ -378,10 +373,6 @@ impl Gear {
         (*ratio != 0.0).then_some(Self { ratio: *ratio, lines, spring })
     }
 
-    fn sprung(&self, generator_rad: f64, twist: f64) -> Sprung {
-        self.sprung_at(self.pitch(generator_rad), twist)
-    }
-
     /// Sine and cosine of the tooth pitch.
     fn pitch(&self, generator_rad: f64) -> (f64, f64) {
         match &self.spring {
@@ -390,7 +381,7 @@ impl Gear {
         }
     }
 
-    fn sprung_at(&self, (s, c): (f64, f64), twist: f64) -> Sprung {
+    fn sprung(&self, (s, c): (f64, f64), twist: f64) -> Sprung {
         match &self.spring {
             Spring::Cubic { half_clearance_rad, stiffness, hardening } => {
                 let beyond = (twist.abs() - half_clearance_rad).max(0.0);
@@ -450,7 +441,7 @@ impl Gear {
     /// At a twist, with the error's slopes and the pitch turned so far.
     fn meshed(&self, twist_rad: f64, error: [f64; 3], pitch: (f64, f64)) -> Meshed {
         let [_, by_generator, by_output] = error;
-        let Sprung { energy_j, torque_n_m, stiffness, by_generator: turning } = self.sprung_at(pitch, twist_rad);
+        let Sprung { energy_j, torque_n_m, stiffness, by_generator: turning } = self.sprung(pitch, twist_rad);
         let twist_by = [-(1.0 + self.ratio * by_generator), 1.0 - by_output];
         let energy_by = [torque_n_m * twist_by[0] + self.ratio * turning, torque_n_m * twist_by[1]];
         Meshed { energy_j, torque_n_m, stiffness, twist_rad, twist_by, energy_by }
@@ -460,7 +451,8 @@ impl Gear {
     /// the side of `sign`.
     pub(crate) fn error_under_rad(&self, generator_rad: f64, mesh_n_m: f64, sign: f64) -> f64 {
         let side = if mesh_n_m == 0.0 { sign } else { mesh_n_m };
-        let torque = |twist: f64| self.sprung(generator_rad, libm::copysign(twist, side)).torque_n_m.abs();
+        let pitch = self.pitch(generator_rad);
+        let torque = |twist: f64| self.sprung(pitch, libm::copysign(twist, side)).torque_n_m.abs();
         let (mut low, mut high) = (0.0, 1e-6);
         for _ in 0..DOUBLINGS {
             if !(torque(high) <= mesh_n_m.abs() && high < 1.0) {
