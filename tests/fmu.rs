@@ -189,7 +189,7 @@ fn the_joint_flies_as_fly_does() {
     let fmu = imported(&desk, "--model joint --scenario camera");
     let mut flown = built_in("camera").unwrap();
     flown.scenario.legs.truncate(3);
-    let unit = unit(flown.kind, flown.scenario.temperature_c).unwrap();
+    let unit = unit(flown.kind, flown.scenario.temperature_c);
     let flight = fly_one(&flown.scenario, &unit, COMPENSATED).unwrap();
     let instance = fmu.ready("joint", &[]);
     let [mut worst, mut most] = [0.0_f64; 2];

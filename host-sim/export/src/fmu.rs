@@ -52,7 +52,7 @@ pub fn compensation(image: Vec<u8>) -> Result<Fmu, FmuExportError> {
 pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, FmuExportError> {
     let scenario = &flown.scenario;
     let Some(image) = image else {
-        let unit = unit(flown.kind, scenario.temperature_c)?;
+        let unit = unit(flown.kind, scenario.temperature_c);
         let image = table_image(scenario, &unit, table_id)?;
         let JointUnit { built, nominal, .. } = unit;
         return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([built, nominal]));

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use flexspline::ImageError;
-use flexspline_fly::fly::{FlyError, OwnTableError};
+use flexspline_fly::fly::OwnTableError;
 use flexspline_fmu::FmuError;
 use flexspline_motion::flight::FlightError;
 
@@ -16,9 +16,6 @@ pub enum FmuExportError {
     /// The drive that the table describes.
     #[error(transparent)]
     Drive(#[from] OwnTableError),
-    /// The scenario's unit.
-    #[error(transparent)]
-    Scenario(#[from] FlyError),
     /// The scenario's table.
     #[error(transparent)]
     Flight(#[from] FlightError),

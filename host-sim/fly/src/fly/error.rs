@@ -1,7 +1,6 @@
 //! Why a joint with mass is not flown.
 
 use flexspline_base::toml_file::Problem;
-use flexspline_design::tables::TableError;
 use flexspline_motion::flight::FlightError;
 
 use super::OwnTableError;
@@ -25,9 +24,6 @@ pub enum FlyError {
     /// A table whose drive cannot be flown.
     #[error(transparent)]
     Table(#[from] OwnTableError),
-    /// The core does not know the drive's teeth.
-    #[error(transparent)]
-    Teeth(#[from] TableError),
     /// The flight itself.
     #[error(transparent)]
     Flight(#[from] FlightError),

@@ -37,14 +37,15 @@ pub struct Flown {
 /// A unit of HHD-95 with this generator at a temperature: wind-up, clearance and ripple of the contact FEM, and what
 /// was built otherwise.
 ///
-/// # Errors
-/// [`FlyError::Teeth`].
-pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<JointUnit, FlyError> {
+/// # Panics
+/// Never: the core knows these teeth.
+#[must_use]
+pub fn unit(kind: GeneratorKind, temperature_c: f64) -> JointUnit {
     let map = GearMap::of(kind);
     let (teeth, wind_up) = (map.teeth, map.at(temperature_c));
     let law = |phase: f64, flank: f64| wind_up.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
-    let drive = core_drive(&Drive::hhd_95())?;
-    Ok(JointUnit::of_spring(drive, SampledSpring::of_law(teeth, map.largest_n_m, law)))
+    let drive = core_drive(&Drive::hhd_95()).expect("the core knows the teeth of HHD-95");
+    JointUnit::of_spring(drive, SampledSpring::of_law(teeth, map.largest_n_m, law))
 }
 
 impl Flown {
@@ -70,7 +71,7 @@ impl Flown {
         self.carries()?;
         let (scenario, known) = (&self.scenario, self.scenario.table);
         let Some(own) = &self.own else {
-            return Ok(fly_watched(scenario, &unit(self.kind, scenario.temperature_c)?, None, each_second)?);
+            return Ok(fly_watched(scenario, &unit(self.kind, scenario.temperature_c), None, each_second)?);
         };
         // What else it may know is sampled from the unit.
         let image = (known == TableKnown::Nominal).then(|| own.image.clone());
