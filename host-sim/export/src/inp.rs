@@ -151,8 +151,9 @@ struct GroundSpring {
 }
 
 /// The deck before it is written. Node and element numbers count from 1 and have no gaps.
-#[derive(Debug, Clone)]
-pub struct Deck {
+pub struct Deck<'p> {
+    problem: &'p Problem,
+    settings: DeckSettings,
     /// Node positions; number n is at n - 1.
     pub nodes: Vec<Point>,
     /// Nodes of the elements; number e is at e - 1.
@@ -174,23 +175,14 @@ pub struct Deck {
     /// Number of the first node of the generator.
     pub first_generator_node: usize,
     springs: Vec<GroundSpring>,
+    /// How far the outer circle is pressed outward, mm.
     seat_mm: f64,
     bearing_turn_rad: f64,
-    load_per_mm: f64,
-    last_load_per_mm: Option<f64>,
-    settings: DeckSettings,
-    heading: String,
-    as_built: bool,
-    modulus: f64,
-    poissons_ratio: f64,
-    bore_stiffness: f64,
-    flank_stiffness: f64,
-    friction: f64,
 }
 
-impl Deck {
+impl<'p> Deck<'p> {
     /// The deck of a problem. The generator starts at angle zero.
-    pub fn new(problem: &Problem, settings: DeckSettings) -> Result<Deck, DeckError> {
+    pub fn new(problem: &'p Problem, settings: DeckSettings) -> Result<Deck<'p>, DeckError> {
         let drive = &problem.drive;
         if drive.output.drag_torque_n_m != 0.0 {
             return Err(DeckError::Drag(drive.output.drag_torque_n_m));
@@ -206,7 +198,10 @@ impl Deck {
         let width = drive.flexspline.width_mm;
         let (fs, cs) = (&problem.flexspline, &problem.circular_spline);
 
+        let thermal = &drive.thermal_state;
         let mut deck = Deck {
+            problem,
+            settings,
             nodes: Vec::new(),
             elements: Vec::new(),
             equations: Vec::new(),
@@ -218,38 +213,13 @@ impl Deck {
             generator: GeneratorBody::new(&problem.outline, fs),
             first_generator_node: 0,
             springs: Vec::new(),
-            seat_mm: 0.0,
+            seat_mm: drive.circular_spline.outer_radius_mm
+                * (thermal.housing_scale / thermal.circular_spline_scale - 1.0),
             bearing_turn_rad: 0.5 * BEARING_TURN * backlash_rad * way,
-            load_per_mm: problem.per_width(settings.torque_n_m),
-            last_load_per_mm: settings.last_torque_n_m.map(|torque| problem.per_width(torque)),
-            settings,
-            as_built: drive.as_built.first_not_uniform().is_some(),
-            heading: format!(
-                "{}, {} generator, {:.3} N.m, flexspline {} and circular spline {} elements",
-                drive.name,
-                problem.kind,
-                settings.torque_n_m,
-                fs.elements.len(),
-                cs.elements.len()
-            ),
-            modulus: drive.material.youngs_modulus_mpa,
-            poissons_ratio: drive.material.poissons_ratio,
-            bore_stiffness: BoreLaw::new(
-                problem.settings.bore_penalty(problem.kind),
-                drive.generator.bearing_stiffness_n_per_mm3,
-            )
-            .stiffness,
-            flank_stiffness: problem.settings.flank_penalty,
-            friction: drive.flanks.friction_coefficient,
         };
         deck.add_wheels([fs, cs]);
         deck.add_generator();
-        let thermal = &drive.thermal_state;
-        deck.hold_circular_spline(
-            cs,
-            fs.nodes.len(),
-            drive.circular_spline.outer_radius_mm * (thermal.housing_scale / thermal.circular_spline_scale - 1.0),
-        );
+        deck.hold_circular_spline(cs, fs.nodes.len());
         deck.hold_flexspline(
             fs,
             drive.sleeve.torsion_stiffness_n_m_per_rad.map(|k| 1e3 * k / width),
@@ -299,9 +269,8 @@ impl Deck {
     }
 
     /// Outer circle: `u = theta J x + seat x / r`.
-    fn hold_circular_spline(&mut self, mesh: &WheelMesh, nodes_before: usize, seat_mm: f64) {
+    fn hold_circular_spline(&mut self, mesh: &WheelMesh, nodes_before: usize) {
         self.output = self.add_helper();
-        self.seat_mm = seat_mm;
         for &node in &self.outer {
             let [x, y] = mesh.nodes[node - 1 - nodes_before];
             let r = x.hypot(y);
@@ -359,8 +328,16 @@ impl Deck {
 
     /// Writes the deck.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "*HEADING\n{}", self.heading)?;
-        if self.as_built {
+        let Problem { drive, kind, flexspline, circular_spline, .. } = self.problem;
+        writeln!(
+            out,
+            "*HEADING\n{}, {kind} generator, {:.3} N.m, flexspline {} and circular spline {} elements",
+            drive.name,
+            self.settings.torque_n_m,
+            flexspline.elements.len(),
+            circular_spline.elements.len()
+        )?;
+        if drive.as_built.first_not_uniform().is_some() {
             writeln!(
                 out,
                 "** flanks and generator as drawn: imperfections of the drive as built are not in this deck"
@@ -412,8 +389,9 @@ impl Deck {
     }
 
     fn write_properties(&self, out: &mut dyn Write) -> io::Result<()> {
-        for (name, modulus) in [("STEEL", self.modulus), ("PRESCRIBED", GENERATOR_MODULUS)] {
-            writeln!(out, "*MATERIAL, NAME={name}\n*ELASTIC\n{}, {}", short(modulus), short(self.poissons_ratio))?;
+        let material = &self.problem.drive.material;
+        for (name, modulus) in [("STEEL", material.youngs_modulus_mpa), ("PRESCRIBED", GENERATOR_MODULUS)] {
+            writeln!(out, "*MATERIAL, NAME={name}\n*ELASTIC\n{}, {}", short(modulus), short(material.poissons_ratio))?;
         }
         for (body, material) in [("FLEXSPLINE", "STEEL"), ("CIRCULAR_SPLINE", "STEEL"), ("GENERATOR", "PRESCRIBED")] {
             writeln!(out, "*SOLID SECTION, ELSET={body}, MATERIAL={material}\n1.")?;
@@ -423,9 +401,11 @@ impl Deck {
 
     fn write_contact(&self, out: &mut dyn Write) -> io::Result<()> {
         let [bore, fs_flanks, cs_flanks, generator] = SURFACES;
+        let Problem { drive, kind, settings, .. } = self.problem;
+        let law = BoreLaw::new(settings.bore_penalty(*kind), drive.generator.bearing_stiffness_n_per_mm3);
         let pairs = [
-            ("ROLLING", self.bore_stiffness, 0.0, bore, generator),
-            ("SLIDING", self.flank_stiffness, self.friction, fs_flanks, cs_flanks),
+            ("ROLLING", law.stiffness, 0.0, bore, generator),
+            ("SLIDING", settings.flank_penalty, drive.flanks.friction_coefficient, fs_flanks, cs_flanks),
         ];
         for (name, stiffness, friction, dependent, independent) in pairs {
             writeln!(out, "*SURFACE INTERACTION, NAME={name}")?;
@@ -439,7 +419,8 @@ impl Deck {
     }
 
     fn steps(&self) -> Vec<DeckStep> {
-        let loaded = DeckStep { generator_rad: 0.0, output: DeckOutput::Loaded(self.load_per_mm), flanks: None };
+        let load = |torque_n_m: f64| DeckOutput::Loaded(self.problem.per_width(torque_n_m));
+        let loaded = DeckStep { generator_rad: 0.0, output: load(self.settings.torque_n_m), flanks: None };
         let mut steps = vec![
             DeckStep { output: DeckOutput::Held(0.0), flanks: Some("REMOVE"), ..loaded },
             DeckStep { output: DeckOutput::Held(self.bearing_turn_rad), flanks: Some("ADD"), ..loaded },
@@ -449,8 +430,8 @@ impl Deck {
         let stands = |steps: usize| 1 + if rollers { steps } else { 0 };
         steps.extend(std::iter::repeat_n(loaded, stands(STANDS)));
         steps.extend((1..=self.settings.increments).flat_map(|k| std::iter::repeat_n(turned(k), stands(1))));
-        if let Some(load) = self.last_load_per_mm {
-            let last = DeckStep { output: DeckOutput::Loaded(load), ..turned(self.settings.increments) };
+        if let Some(torque_n_m) = self.settings.last_torque_n_m {
+            let last = DeckStep { output: load(torque_n_m), ..turned(self.settings.increments) };
             steps.extend(std::iter::repeat_n(last, stands(STANDS)));
         }
         steps
@@ -564,7 +545,7 @@ mod tests {
         DeckSettings { torque_n_m: 50.0, last_torque_n_m: Some(-20.0), increments: 2, step_rad: 0.01 };
 
     /// A deck as any reader of keywords sees it: blocks of a keyword line and its data lines.
-    fn blocks(deck: &Deck) -> Vec<(String, Vec<Vec<String>>)> {
+    fn blocks(deck: &Deck<'_>) -> Vec<(String, Vec<Vec<String>>)> {
         let mut text = Vec::new();
         deck.write(&mut text).unwrap();
         let mut blocks: Vec<(String, Vec<Vec<String>>)> = Vec::new();
@@ -634,7 +615,8 @@ mod tests {
     #[test]
     fn no_number_is_too_long_for_calculix() {
         let drive = Drive::hhd_95_typical().with_set("output.drag_torque_n_m=0").unwrap();
-        let deck = Deck::new(&problem(&drive, GeneratorKind::FourRoller), SETTINGS).unwrap();
+        let problem = problem(&drive, GeneratorKind::FourRoller);
+        let deck = Deck::new(&problem, SETTINGS).unwrap();
         for (keyword, lines) in blocks(&deck).iter().filter(|(keyword, _)| keyword != "*HEADING") {
             for word in lines.iter().flatten().filter(|word| word.parse::<f64>().is_ok()) {
                 assert!(word.len() <= 20, "{keyword}: {word}");
@@ -680,7 +662,8 @@ mod tests {
 
     #[test]
     fn a_unit_of_output_turns_the_outer_circle() {
-        let deck = Deck::new(&problem(&drive(), GeneratorKind::Cam), SETTINGS).unwrap();
+        let problem = problem(&drive(), GeneratorKind::Cam);
+        let deck = Deck::new(&problem, SETTINGS).unwrap();
         let mut turned = 0;
         for equation in deck.equations.iter().filter(|equation| deck.outer.contains(&equation[0].node)) {
             let [first, angle, seat] = equation[..] else { panic!("{equation:?}") };
@@ -733,7 +716,8 @@ mod tests {
     #[test]
     fn rollers_stand_after_what_makes_the_rim_creep() {
         let angles = |kind| -> Vec<f64> {
-            let deck = Deck::new(&problem(&drive(), kind), SETTINGS).unwrap();
+            let problem = problem(&drive(), kind);
+            let deck = Deck::new(&problem, SETTINGS).unwrap();
             deck.steps().iter().map(|step| step.generator_rad).collect()
         };
         assert_eq!(angles(GeneratorKind::DoubleDisc), [0.0, 0.0, 0.0, 0.01, 0.02, 0.02]);
@@ -743,17 +727,14 @@ mod tests {
 
     #[test]
     fn drag_is_refused_by_name() {
-        let error = Deck::new(&problem(&Drive::hhd_95(), GeneratorKind::Cam), SETTINGS).unwrap_err();
+        let error = Deck::new(&problem(&Drive::hhd_95(), GeneratorKind::Cam), SETTINGS).err().unwrap();
         assert!(error.to_string().starts_with("output.drag_torque_n_m: found 0.02"), "{error}");
     }
 
     #[test]
     fn a_sleeve_of_shells_is_refused_by_name() {
-        let error = Deck::new(
-            &problem(&Drive::cup_95().with_set("output.drag_torque_n_m=0").unwrap(), GeneratorKind::Cam),
-            SETTINGS,
-        );
-        let error = error.unwrap_err().to_string();
+        let problem = problem(&Drive::cup_95().with_set("output.drag_torque_n_m=0").unwrap(), GeneratorKind::Cam);
+        let error = Deck::new(&problem, SETTINGS).err().unwrap().to_string();
         assert!(error.starts_with("sleeve.kind: found \"cup\", and a deck is plane where it has contact"), "{error}");
     }
 
@@ -761,7 +742,8 @@ mod tests {
     fn friction_and_a_soft_sleeve_are_in_the_deck_when_the_drive_has_them() {
         let typical = Drive::hhd_95_typical().with_set("output.drag_torque_n_m=0").unwrap();
         let keywords = |drive: &Drive| -> Vec<String> {
-            let deck = Deck::new(&problem(drive, GeneratorKind::Cam), SETTINGS).unwrap();
+            let problem = problem(drive, GeneratorKind::Cam);
+            let deck = Deck::new(&problem, SETTINGS).unwrap();
             blocks(&deck).into_iter().map(|(keyword, _)| keyword).collect()
         };
         for (drive, expected) in [(typical, true), (drive(), false)] {

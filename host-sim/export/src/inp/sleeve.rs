@@ -44,7 +44,8 @@ type Place = (usize, usize, usize);
 
 /// The deck before it is written.
 #[derive(Debug, Clone)]
-pub struct SleeveDeck {
+pub struct SleeveDeck<'d> {
+    drive: &'d Drive,
     /// Number of each node by its place; they count from 1.
     numbers: BTreeMap<Place, usize>,
     elements: Vec<[usize; 20]>,
@@ -56,19 +57,16 @@ pub struct SleeveDeck {
     lines: Vec<usize>,
     middle: usize,
     force_n: f64,
-    modulus: f64,
-    poissons_ratio: f64,
     clamped: Vec<usize>,
     in_plane: Vec<usize>,
-    name: String,
 }
 
-impl SleeveDeck {
+impl<'d> SleeveDeck<'d> {
     /// The deck of a drive with a sleeve of shells.
     ///
     /// # Errors
     /// Ends that the deck has not.
-    pub fn new(drive: &Drive) -> Result<SleeveDeck, DeckError> {
+    pub fn new(drive: &'d Drive) -> Result<SleeveDeck<'d>, DeckError> {
         let sleeve = &drive.sleeve;
         if sleeve.has_flange() && sleeve.flange != Flange::Rigid {
             return Err(DeckError::End { field: "flange", found: sleeve.flange.name(), allowed: "rigid" });
@@ -120,16 +118,14 @@ impl SleeveDeck {
         let around: Vec<f64> = even(0.0, FRAC_PI_2, 2 * AROUND);
         let (along, through) = (halves(&corners), halves(&depths));
         let mut deck = SleeveDeck {
+            drive,
             numbers: BTreeMap::new(),
             elements: Vec::new(),
             lines: lines.iter().filter_map(|line| along.iter().position(|x| (x - line).abs() < 1e-9)).collect(),
             middle: through.iter().position(|z| z.abs() < 1e-9).unwrap_or(0),
             force_n: 0.25 * drive.generator.w0_mm * shells.harmonic(2).k_band_n_per_mm,
-            modulus: drive.material.youngs_modulus_mpa,
-            poissons_ratio: drive.material.poissons_ratio,
             clamped: Vec::new(),
             in_plane: Vec::new(),
-            name: drive.name.clone(),
             through: through.iter().map(|z| radius + z).collect(),
             along,
             around,
@@ -179,7 +175,7 @@ impl SleeveDeck {
 
     /// Writes the deck.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "*HEADING\n{}: a quarter of the flexspline, smooth rim, a band of cos 2 theta", self.name)?;
+        writeln!(out, "*HEADING\n{}: a quarter of the flexspline, smooth rim, a band of cos 2 theta", self.drive.name)?;
         writeln!(out, "** mm, N, MPa; z along the axis, from the flange to the bottom, 0 in the middle of the rim")?;
         let mut nodes: Vec<(usize, [f64; 3])> = Vec::with_capacity(self.numbers.len());
         for ((k, j, i), number) in &self.numbers {
@@ -212,7 +208,13 @@ impl SleeveDeck {
             list(out, nodes.iter().copied())?;
         }
         self.write_band(out, band)?;
-        writeln!(out, "*MATERIAL, NAME=STEEL\n*ELASTIC\n{}, {}", short(self.modulus), short(self.poissons_ratio))?;
+        let material = &self.drive.material;
+        writeln!(
+            out,
+            "*MATERIAL, NAME=STEEL\n*ELASTIC\n{}, {}",
+            short(material.youngs_modulus_mpa),
+            short(material.poissons_ratio)
+        )?;
         writeln!(out, "*SOLID SECTION, ELSET=FLEXSPLINE, MATERIAL=STEEL")?;
         writeln!(out, "*BOUNDARY")?;
         // A node of a plane of symmetry that an end holds is held once.
@@ -319,7 +321,8 @@ mod tests {
 
     #[test]
     fn bricks_have_positive_volume_and_the_band_is_tied() {
-        let deck = SleeveDeck::new(&Drive::cup_95()).unwrap();
+        let drive = Drive::cup_95();
+        let deck = SleeveDeck::new(&drive).unwrap();
         let place: BTreeMap<usize, Place> = deck.numbers.iter().map(|(place, n)| (*n, *place)).collect();
         for element in &deck.elements {
             let at = element.map(|n| {
