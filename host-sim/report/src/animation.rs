@@ -106,13 +106,12 @@ pub enum AnimationError {
     Simulate(#[from] SimulateError),
 }
 
-/// Runs the drive over one pitch under a load and takes it down. `observe` may stop the run.
+/// Runs the drive over one pitch under a load and takes it down.
 pub fn animate(
     drive: &Drive,
     kind: GeneratorKind,
     torque_n_m: f64,
     solver: SolverSettings,
-    observe: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Animation, AnimationError> {
     if let Some(field) = drive.as_built.first_not_uniform() {
         return Err(AnimationError::NotPeriodic { field });
@@ -126,7 +125,7 @@ pub fn animate(
     let mut passing = Passing::new(drive);
     simulate(drive, &settings, &mut |now| {
         passing.see(now);
-        observe()
+        ControlFlow::Continue(())
     })?;
     let made = passing.finish().map_err(|error| SimulateError::from(SolveError::from(error)))?;
     Ok(made.expect("a pitch has all frames"))
@@ -425,8 +424,7 @@ mod tests {
     fn eight_frames_describe_every_tooth_at_any_time() {
         let drive = Drive::hhd_95();
         let torque = 10.0;
-        let animation =
-            animate(&drive, GeneratorKind::Cam, torque, coarse(), &mut || ControlFlow::Continue(())).unwrap();
+        let animation = animate(&drive, GeneratorKind::Cam, torque, coarse()).unwrap();
         let pitch = std::f64::consts::TAU / 188.0;
         let far: Vec<_> = (0..=24)
             .map(|k| flexspline_design::simulate::PathPoint {
@@ -482,7 +480,7 @@ mod tests {
     fn the_forces_that_are_shown_hold_the_load() {
         let drive = Drive::hhd_95();
         let torque = 50.0;
-        let a = animate(&drive, GeneratorKind::Cam, torque, coarse(), &mut || ControlFlow::Continue(())).unwrap();
+        let a = animate(&drive, GeneratorKind::Cam, torque, coarse()).unwrap();
         let samples = a.flexspline.samples;
         let at = |row: usize, s: usize| a.forces[row * samples + s];
         for frame in 0..FRAMES {
@@ -531,15 +529,14 @@ mod tests {
     #[test]
     fn what_does_not_repeat_is_refused() {
         let drive = Drive::hhd_95().with_set("as_built.circular_spline_eccentricity_um=10").unwrap();
-        let error = animate(&drive, GeneratorKind::Cam, 0.0, coarse(), &mut || ControlFlow::Continue(())).unwrap_err();
+        let error = animate(&drive, GeneratorKind::Cam, 0.0, coarse()).unwrap_err();
         assert!(error.to_string().contains("as_built.circular_spline_eccentricity_um"), "{error}");
     }
 
     /// Four generators on the standard mesh have to fit a page of 1.5 MB; the coarse mesh has half its nodes.
     #[test]
     fn a_drive_in_motion_is_small() {
-        let a = animate(&Drive::hhd_95(), GeneratorKind::TwoRoller, 10.0, coarse(), &mut || ControlFlow::Continue(()))
-            .unwrap();
+        let a = animate(&Drive::hhd_95(), GeneratorKind::TwoRoller, 10.0, coarse()).unwrap();
         let packed = a.pack();
         let characters: usize = packed.iter().map(|p| p.text.len()).sum();
         let numbers = a.flexspline.displacement_mm.len() + a.circular_spline.displacement_mm.len();

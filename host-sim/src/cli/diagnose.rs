@@ -11,15 +11,16 @@ use super::{Failure, bad_file, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::kernels::Kernels;
 use flexspline_identify::causes::CauseName;
-use flexspline_identify::diagnosis::Settings;
 use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::pipeline::{
     Diagnosed, Extension, Made, PipelineError, Subject, diagnose_rows, parse_rows,
 };
 use flexspline_identify::diagnosis::report::Diagnosis;
+use flexspline_identify::diagnosis::{FittedCause, Settings};
 use flexspline_identify::extension::Model;
 use flexspline_identify::measurement::{ColumnMap, Recording, bytes_of};
 use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_report::diagnosis_report::{self, DiagnosisSources};
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///
@@ -103,10 +104,22 @@ impl Diagnose {
         let written = done.file(extension, &context.command);
         outputs.json(&out.join("diagnosis.json"), &written)?;
         if !self.no_report {
-            let inputs = [Some(self.data.as_path()), self.model.as_deref()];
+            let hashed = |path: &Path| {
+                let bytes = std::fs::read(path).ok()?;
+                Some((format!("BLAKE3 of {}", path.display()), blake3::hash(&bytes).to_string()))
+            };
             let (nominal, table) = (&subject.nominal, subject.table.as_ref());
-            let page =
-                report::diagnosis(context, inputs, recording, nominal, table, diagnosis, (extended, &extension.table));
+            let files = [Some(self.data.as_path()), self.model.as_deref()].into_iter().flatten().filter_map(hashed);
+            let page = diagnosis_report::page(DiagnosisSources {
+                recording,
+                nominal,
+                diagnosis,
+                table: &extension.table,
+                series: &extended.predict(&recording.sessions, nominal, table),
+                causes: extended.causes().iter().map(FittedCause::name).collect(),
+                command: &context.command,
+                inputs: files.chain(table.map(|table| ("table_id".to_owned(), table.id().to_string()))).collect(),
+            });
             report::write(&page, out, &mut outputs)?;
         }
         outputs.finish()?;

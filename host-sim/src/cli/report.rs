@@ -1,7 +1,6 @@
 //! `report.html`, for the commands that write one. The page of another command that stands in the folder is kept under
 //! another name.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -12,15 +11,10 @@ use super::{Context, Failure};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::TableInfo;
 use flexspline_design::tables::validate::Validation;
-use flexspline_identify::diagnosis::report::Diagnosis;
-use flexspline_identify::diagnosis::{Extended, WrittenTable};
-use flexspline_identify::measurement::Recording;
-use flexspline_identify::nominal::Nominal;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::animation::{Animation, AnimationError, animate};
-use flexspline_report::diagnosis_report::{self, DiagnosisSources};
 use flexspline_report::page::{Page, command_of};
 use flexspline_report::{DriveSources, DriveSubject, drive_report, shown_torque_n_m};
 
@@ -61,43 +55,12 @@ pub(super) fn in_motion(
     shown
         .par_iter()
         .map(|(kind, torque_n_m)| {
-            let made = animate(drive, *kind, *torque_n_m, solver, &mut || ControlFlow::Continue(()));
+            let made = animate(drive, *kind, *torque_n_m, solver);
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress.set(done, shown.len(), &format!("{kind} in motion"));
             made
         })
         .collect()
-}
-
-/// The page of a diagnosis; `inputs` are the files it was made from.
-pub(super) fn diagnosis<'p>(
-    context: &Context,
-    inputs: impl IntoIterator<Item = Option<&'p Path>>,
-    recording: &Recording,
-    nominal: &Nominal,
-    table: Option<&Table<'_>>,
-    diagnosis: &Diagnosis,
-    (extended, written): (&Extended, &WrittenTable),
-) -> Page {
-    let hashed = |path: &Path| {
-        let bytes = std::fs::read(path).ok()?;
-        Some((format!("BLAKE3 of {}", path.display()), blake3::hash(&bytes).to_string()))
-    };
-    let mut inputs: Vec<(String, String)> = inputs.into_iter().flatten().filter_map(hashed).collect();
-    inputs.extend(table.map(|table| ("table_id".to_owned(), table.id().to_string())));
-    let series = extended.predict(&recording.sessions, nominal, table);
-    let (levels, parts) = diagnosis_report::levels_and_parts(&series, extended, diagnosis);
-    let command = &context.command;
-    diagnosis_report::page(DiagnosisSources {
-        recording,
-        nominal,
-        diagnosis,
-        table: written,
-        levels,
-        parts,
-        command,
-        inputs,
-    })
 }
 
 /// The page of every command.

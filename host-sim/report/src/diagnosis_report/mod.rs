@@ -22,7 +22,7 @@ use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
 use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Unexplained, Verdict};
 use flexspline_identify::diagnosis::rows::Rows;
-use flexspline_identify::diagnosis::{Extended, Series, WrittenTable};
+use flexspline_identify::diagnosis::{Series, WrittenTable};
 use flexspline_identify::measurement::{Fault, Recording, Session};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::Picture;
@@ -30,54 +30,6 @@ use thin::Clock;
 
 /// Rows that a table of the data shows at most; the rest is in diagnosis.json.
 const MOST: usize = 60;
-
-/// The residual of one model.
-#[derive(Debug, Clone)]
-pub struct Level {
-    /// Which model; letters.
-    pub id: &'static str,
-    /// Name, as the reader sees it.
-    pub name: &'static str,
-    /// Measured error less the model, arcsec, a value for each row of all sessions.
-    pub residual_arcsec: Vec<f64>,
-}
-
-/// The contribution of one cause.
-#[derive(Debug, Clone)]
-pub struct Part {
-    /// Its name.
-    pub cause: CauseName,
-    /// Its contribution to the prediction, arcsec, a value for each row of all sessions.
-    pub adds_arcsec: Vec<f64>,
-}
-
-/// The residual of each model and the contribution of each cause, from the predictions of the extended model for all
-/// sessions.
-pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diagnosis) -> (Vec<Level>, Vec<Part>) {
-    let level = |id, name, predicted: fn(&Series) -> &[f64]| {
-        let residual_arcsec = series.iter().flat_map(|series| series.less(predicted(series))).collect();
-        Level { id, name, residual_arcsec }
-    };
-    let mut levels = vec![
-        level("nominal", "nominal", |series| &series.nominal_arcsec),
-        level("recalibrated", "recalibrated", |series| &series.recalibrated_arcsec),
-    ];
-    // What was tried and not named is in no model that a reader is shown.
-    if diagnosis.causes.is_empty() {
-        return (levels, Vec::new());
-    }
-    levels.push(level("extended", "with the causes", |series| &series.extended_arcsec));
-    let parts = extended
-        .causes()
-        .iter()
-        .enumerate()
-        .map(|(k, cause)| Part {
-            cause: cause.name(),
-            adds_arcsec: series.iter().flat_map(|s| s.cause_arcsec.get(k).cloned().unwrap_or_default()).collect(),
-        })
-        .collect();
-    (levels, parts)
-}
 
 /// Inputs of the page.
 pub struct DiagnosisSources<'a> {
@@ -89,19 +41,24 @@ pub struct DiagnosisSources<'a> {
     pub diagnosis: &'a Diagnosis,
     /// The table that it ends in.
     pub table: &'a WrittenTable,
-    /// The residual of each model; the nominal model first.
-    pub levels: Vec<Level>,
-    /// The contribution of each cause.
-    pub parts: Vec<Part>,
+    /// What the models predict for the rows of each session.
+    pub series: &'a [Series],
+    /// The causes of these series, in their order.
+    pub causes: Vec<CauseName>,
     /// The command line.
     pub command: &'a str,
     /// Further provenance: name and value.
     pub inputs: Vec<(String, String)>,
 }
 
-/// A level with what its figures are drawn from.
-struct Shown {
-    level: Level,
+/// The residual of one model, and its picture.
+struct Level {
+    /// Which model; letters.
+    id: &'static str,
+    /// Name, as the reader sees it.
+    name: &'static str,
+    /// Measured error less the model, arcsec, a value for each row of all sessions.
+    residual_arcsec: Vec<f64>,
     picture: Option<Picture>,
 }
 
@@ -110,21 +67,39 @@ struct DiagnosisKnown<'a> {
     sources: DiagnosisSources<'a>,
     rows: Rows,
     clock: Clock,
-    shown: Vec<Shown>,
+    /// The nominal model first.
+    levels: Vec<Level>,
+    /// What each cause adds to the prediction, arcsec, a value for each row of all sessions.
+    parts: Vec<(CauseName, Vec<f64>)>,
 }
 
+/// A model: letters, its name, and what it predicts.
+type PredictedBy = (&'static str, &'static str, fn(&Series) -> &[f64]);
+
 /// The page of a diagnosis.
-pub fn page(mut sources: DiagnosisSources<'_>) -> Page {
-    let (nominal, recording) = (sources.nominal, sources.recording);
+pub fn page(sources: DiagnosisSources<'_>) -> Page {
+    let DiagnosisSources { recording, nominal, diagnosis, series, causes, .. } = &sources;
     let rows = Rows::new(&recording.sessions, nominal);
-    let mut levels = std::mem::take(&mut sources.levels);
-    levels.retain(|level| level.residual_arcsec.len() == rows.len());
-    sources.parts.retain(|part| part.adds_arcsec.len() == rows.len());
-    let shown = levels
-        .into_par_iter()
-        .map(|level| Shown { picture: Picture::of(&rows, &level.residual_arcsec, nominal.ratio).ok(), level })
-        .collect();
-    DiagnosisKnown { clock: Clock::new(&rows), rows, shown, sources }.page()
+    let models: [PredictedBy; 3] = [
+        ("nominal", "nominal", |series| &series.nominal_arcsec),
+        ("recalibrated", "recalibrated", |series| &series.recalibrated_arcsec),
+        ("extended", "with the causes", |series| &series.extended_arcsec),
+    ];
+    // What was tried and not named is in no model that a reader is shown.
+    let (models, causes) =
+        if diagnosis.causes.is_empty() { (&models[..2], &[][..]) } else { (&models[..], &causes[..]) };
+    let level = |&(id, name, predicted): &PredictedBy| {
+        let residual_arcsec: Vec<f64> = series.iter().flat_map(|series| series.less(predicted(series))).collect();
+        let picture = Picture::of(&rows, &residual_arcsec, nominal.ratio).ok();
+        Level { id, name, residual_arcsec, picture }
+    };
+    let levels = models.par_iter().map(level).filter(|level| level.residual_arcsec.len() == rows.len()).collect();
+    let part = |(k, cause): (usize, &CauseName)| {
+        let of_session = |series: &Series| series.cause_arcsec.get(k).cloned().unwrap_or_default();
+        (*cause, series.iter().flat_map(of_session).collect::<Vec<f64>>())
+    };
+    let parts = causes.iter().enumerate().map(part).filter(|(_, adds)| adds.len() == rows.len()).collect();
+    DiagnosisKnown { clock: Clock::new(&rows), rows, levels, parts, sources }.page()
 }
 
 impl DiagnosisKnown<'_> {
@@ -147,11 +122,7 @@ impl DiagnosisKnown<'_> {
             ("Gear".to_owned(), format!("ratio {}{teeth}", nominal.ratio)),
         ];
         provenance.extend(inputs.iter().cloned());
-        let choices: Vec<Choice> = self
-            .shown
-            .iter()
-            .map(|shown| Choice { id: shown.level.id.into(), name: shown.level.name.into() })
-            .collect();
+        let choice = |level: &Level| Choice { id: level.id.into(), name: level.name.into() };
         let results = [
             ("diagnosis", json!(diagnosis)),
             ("data_faults", json!(recording.faults)),
@@ -165,7 +136,7 @@ impl DiagnosisKnown<'_> {
             status,
             also,
             remarks: self.remarks(),
-            choices,
+            choices: self.levels.iter().map(choice).collect(),
             choice_is: "Error less the model:",
             headlines: vec![self.headline()],
             sections,
@@ -279,7 +250,7 @@ impl DiagnosisKnown<'_> {
             let axes = [self.time_axis(), ChartAxis::new(y, PageQuantity::Error)];
             PageBlock::lines(id, title, caption, axes, chart.for_every_choice())
         };
-        let levels = self.shown.iter().map(|shown| &shown.level).zip([5, 0, 1]);
+        let levels = self.levels.iter().zip([5, 0, 1]);
         let mut blocks = vec![over_time(
             "over-time",
             "Residual of each model over time",
@@ -289,14 +260,14 @@ impl DiagnosisKnown<'_> {
             "Error less model",
             &mut levels.map(|(level, colour)| (level.name, level.residual_arcsec.as_slice(), colour)),
         )];
-        if !self.sources.parts.is_empty() {
-            let parts = self.sources.parts.iter().enumerate();
+        if !self.parts.is_empty() {
+            let parts = self.parts.iter().enumerate();
             blocks.push(over_time(
                 "added",
                 "What each cause adds, over time",
                 "Least and largest of each stretch of rows of what it adds to the prediction.",
                 "Adds to the error",
-                &mut parts.map(|(k, part)| (part.cause.words(), part.adds_arcsec.as_slice(), k)),
+                &mut parts.map(|(k, (cause, adds))| (cause.words(), adds.as_slice(), k)),
             ));
         }
         PageSection::folded("before-after", "Before and after", blocks)
@@ -651,14 +622,18 @@ mod tests {
     fn page_of(diagnosis: &Diagnosis, faults: Vec<Fault>) -> Page {
         let (recording, nominal) = (recording(faults), catalogue_drive());
         let rows = Rows::new(&recording.sessions, &nominal);
-        let level = Level { id: "nominal", name: "nominal", residual_arcsec: rows.error.clone() };
+        let series = |session: &std::ops::Range<usize>| Series {
+            measured_arcsec: rows.error[session.clone()].to_vec(),
+            nominal_arcsec: vec![0.0; session.len()],
+            ..Series::default()
+        };
         page(DiagnosisSources {
             recording: &recording,
             nominal: &nominal,
             diagnosis,
             table: &WrittenTable::default(),
-            levels: vec![level],
-            parts: Vec::new(),
+            series: &rows.sessions.iter().map(series).collect::<Vec<_>>(),
+            causes: Vec::new(),
             command: "flexspline diagnose",
             inputs: Vec::new(),
         })

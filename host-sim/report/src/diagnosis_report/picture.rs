@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::thin::{dots, medians, some_rows};
-use super::{DiagnosisKnown, Shown, words};
+use super::{DiagnosisKnown, Level, words};
 use crate::page::{
     ChartAxis, ChartSeries, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection, RichText,
     significant,
@@ -14,9 +14,6 @@ use flexspline_identify::residual::Axis as Angle;
 
 /// Cells of the map, across and up.
 const MAP: [usize; 2] = [72, 36];
-/// Medians over a quantity, and rows that each needs.
-const MEDIANS: usize = 24;
-const FEWEST_IN_MEDIAN: usize = 12;
 /// A quantity that changes by less than this share of itself is no axis.
 const CHANGES: f64 = 0.03;
 /// Rows that a cell needs before its median is shown.
@@ -36,10 +33,10 @@ impl DiagnosisKnown<'_> {
         title: &str,
         caption: &str,
         x: ChartAxis,
-        of: impl Fn(&Shown) -> Option<Lines>,
+        of: impl Fn(&Level) -> Option<Lines>,
     ) -> Option<PageBlock> {
-        let chart = |shown: &Shown| Some((shown.level.id.to_owned(), of(shown)?));
-        let charts: Vec<_> = self.shown.iter().filter_map(chart).collect();
+        let chart = |level: &Level| Some((level.id.to_owned(), of(level)?));
+        let charts: Vec<_> = self.levels.iter().filter_map(chart).collect();
         let axes = [x, ChartAxis::new("Error less model", PageQuantity::Error)];
         (!charts.is_empty()).then(|| PageBlock::lines(id, title, caption, axes, charts))
     }
@@ -50,8 +47,8 @@ impl DiagnosisKnown<'_> {
     }
 
     /// Dots and medians over a quantity, by direction.
-    fn over(&self, quantity: &[f64], shown: &Shown) -> Option<Lines> {
-        let values = &shown.level.residual_arcsec;
+    fn over(&self, quantity: &[f64], level: &Level) -> Option<Lines> {
+        let values = &level.residual_arcsec;
         let mut lines = Lines::default();
         let some = some_rows(self.rows.len());
         for (colour, (direction, name)) in DIRECTIONS.into_iter().enumerate() {
@@ -61,7 +58,7 @@ impl DiagnosisKnown<'_> {
             }
         }
         for (colour, (direction, name)) in DIRECTIONS.into_iter().enumerate() {
-            let points = medians(quantity, values, self.rows_in(direction), MEDIANS, FEWEST_IN_MEDIAN);
+            let points = medians(quantity, values, self.rows_in(direction));
             if points.len() > 1 {
                 lines.series.push(ChartSeries::new(format!("{name}, median"), Mark::Line, 2 + colour, points));
             }
@@ -74,7 +71,7 @@ impl DiagnosisKnown<'_> {
         let rows = &self.rows;
         let mut blocks = Vec::new();
         let maps: Vec<(String, FieldMap)> =
-            self.shown.iter().filter_map(|shown| Some((shown.level.id.to_owned(), self.map(shown)?))).collect();
+            self.levels.iter().filter_map(|level| Some((level.id.to_owned(), self.map(level)?))).collect();
         if !maps.is_empty() {
             let caption = "Median of the rows in each cell; cells that were not visited are empty. What sits on the \
                            generator stands upright, what sits on the output lies flat, what sits on the wheel that \
@@ -93,8 +90,8 @@ impl DiagnosisKnown<'_> {
             "Over the generator angle",
             "Some rows of all, drawn evenly. This is measured error less what the model says, before anybody says why.",
             ChartAxis::new("Generator angle", PageQuantity::Turn),
-            |shown| {
-                let mut lines = self.over(&turns, shown)?;
+            |level| {
+                let mut lines = self.over(&turns, level)?;
                 lines.series.retain(|series| series.mark == Mark::Dots);
                 Some(lines)
             },
@@ -128,7 +125,7 @@ impl DiagnosisKnown<'_> {
             if recorded && varies(values) {
                 let caption = format!("Dots are some rows, lines medians of all. {sees}");
                 let title = format!("Over the {over}");
-                let over = |shown: &Shown| self.over(values, shown);
+                let over = |level: &Level| self.over(values, level);
                 blocks.extend(self.lines(&format!("over-{id}"), &title, &caption, axis, over));
             }
         }
@@ -138,11 +135,11 @@ impl DiagnosisKnown<'_> {
     }
 
     /// Medians over both turns.
-    fn map(&self, shown: &Shown) -> Option<FieldMap> {
+    fn map(&self, level: &Level) -> Option<FieldMap> {
         let [across, up] = MAP;
         let place = |angle: f64, of: usize| ((angle.rem_euclid(TAU) / TAU * of as f64) as usize).min(of - 1);
         let mut cells: Vec<Vec<f64>> = vec![Vec::new(); across * up];
-        for (k, value) in shown.level.residual_arcsec.iter().enumerate() {
+        for (k, value) in level.residual_arcsec.iter().enumerate() {
             cells[place(self.rows.output[k], up) * across + place(self.rows.generator[k], across)].push(*value);
         }
         let middle = |k: usize, of: usize| (k as f64 + 0.5) / of as f64 * 360.0;
@@ -183,18 +180,18 @@ impl DiagnosisKnown<'_> {
                 &format!("Orders in a turn of {symbol}"),
                 &caption,
                 ChartAxis::new(format!("Waves in a turn of {symbol}"), PageQuantity::Count),
-                |shown| {
-                    let spectrum = shown.picture.as_ref()?.spectra.iter().find(|s| s.axis == angle)?;
+                |level| {
+                    let spectrum = level.picture.as_ref()?.spectra.iter().find(|s| s.axis == angle)?;
                     if spectrum.orders.is_empty() {
                         return None;
                     }
                     let x = &spectrum.orders;
                     let curve = |y: &[f64]| x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
-                    let (amplitude, level) = (curve(&spectrum.amplitude_arcsec), curve(&spectrum.level_arcsec));
+                    let (amplitude, noise) = (curve(&spectrum.amplitude_arcsec), curve(&spectrum.level_arcsec));
                     let peaks = spectrum.peaks.iter().map(|peak| [peak.order, peak.amplitude_arcsec]).collect();
                     let mut series = vec![
                         ChartSeries::new("amplitude", Mark::Line, 0, amplitude),
-                        ChartSeries::new("level of noise", Mark::Dashed, 5, level),
+                        ChartSeries::new("level of noise", Mark::Dashed, 5, noise),
                     ];
                     if !spectrum.peaks.is_empty() {
                         series.push(ChartSeries::sorted("lines", Mark::Points, 1, peaks));
@@ -203,7 +200,7 @@ impl DiagnosisKnown<'_> {
                 },
             ));
         }
-        blocks.extend(self.shown.iter().filter_map(|shown| self.peak_table(shown)));
+        blocks.extend(self.levels.iter().filter_map(|level| self.peak_table(level)));
         if blocks.is_empty() {
             blocks.push(PageBlock::paragraph("The drive turned too little for orders."));
         }
@@ -211,11 +208,11 @@ impl DiagnosisKnown<'_> {
     }
 
     /// The lines of the spectra with the parts that have such orders.
-    fn peak_table(&self, shown: &Shown) -> Option<PageBlock> {
+    fn peak_table(&self, level: &Level) -> Option<PageBlock> {
         let mut rows = Vec::new();
         for (angle, _) in ANGLES {
             let (symbol, _) = self.angle_name(angle);
-            let spectrum = shown.picture.as_ref()?.spectra.iter().find(|s| s.axis == angle);
+            let spectrum = level.picture.as_ref()?.spectra.iter().find(|s| s.axis == angle);
             for peak in spectrum.into_iter().flat_map(|s| &s.peaks).take(6) {
                 let parts: Vec<String> = peak
                     .named
@@ -241,7 +238,8 @@ impl DiagnosisKnown<'_> {
             }
         }
         let header = ["Order", "Amplitude", "Parts with such an order"];
-        of_level(shown, "Lines above the noise, strongest first in each angle", &header, rows)
+        let caption = "Lines above the noise, strongest first in each angle";
+        (!rows.is_empty()).then(|| PageBlock::table(caption, &header, rows).of_choice(level.id))
     }
 }
 
@@ -256,9 +254,4 @@ fn varies(values: &[f64]) -> bool {
 /// A value in arcsec with its standard deviation.
 fn plus_minus(value: f64, std: f64) -> RichText {
     RichText::arcsec(value, 3).plain("\u{a0}±\u{a0}").error(std, 2)
-}
-
-/// A table of a level, where it has rows.
-fn of_level(shown: &Shown, caption: &str, header: &[&str], rows: Vec<Vec<RichText>>) -> Option<PageBlock> {
-    (!rows.is_empty()).then(|| PageBlock::table(caption, header, rows).of_choice(shown.level.id))
 }

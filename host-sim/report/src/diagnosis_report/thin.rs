@@ -1,12 +1,17 @@
 //! Forty thousand rows to what a chart can show: the least and the largest of each stretch, medians of bins, some rows
 //! of all.
 
+use std::ops::Range;
+
 use crate::page::{ChartSeries, Mark, Upright};
 use flexspline_base::robust::{least_and_most, median_of};
 use flexspline_identify::diagnosis::rows::Rows;
 
 /// Stretches of a chart over time.
 const STRETCHES: usize = 500;
+/// Medians over a quantity, and rows that each needs.
+const MEDIANS: usize = 24;
+const FEWEST_IN_MEDIAN: usize = 12;
 /// Rows that are shown as dots.
 const DOTS: usize = 1600;
 /// Breaks between sessions, as a share of all the time that was recorded.
@@ -44,18 +49,13 @@ impl Clock {
 }
 
 /// Stretches of rows, none across sessions, in proportion to their rows.
-fn stretches(rows: &Rows) -> Vec<std::ops::Range<usize>> {
+fn stretches(rows: &Rows) -> Vec<Range<usize>> {
     let size = rows.len().div_ceil(STRETCHES).max(1);
-    let mut all = Vec::new();
-    for session in &rows.sessions {
-        let mut from = session.start;
-        while from < session.end {
-            let to = (from + size).min(session.end);
-            all.push(from..to);
-            from = to;
-        }
-    }
-    all
+    let of_session = |session: &Range<usize>| {
+        let end = session.end;
+        session.clone().step_by(size).map(move |from| from..(from + size).min(end))
+    };
+    rows.sessions.iter().flat_map(of_session).collect()
 }
 
 /// Least and largest value of each stretch, so that nothing that stands out is lost; the line breaks between sessions.
@@ -101,25 +101,19 @@ pub(super) fn dots(over: &[f64], values: &[f64], rows: &[usize], name: &str, col
     ChartSeries::sorted(name, Mark::Dots, colour, rows.iter().map(|k| [over[*k], values[*k]]).collect())
 }
 
-/// Medians of `count` bins of equal width over a quantity, ascending, where a bin has `fewest` rows.
-pub(super) fn medians(
-    over: &[f64],
-    values: &[f64],
-    rows: impl Iterator<Item = usize> + Clone,
-    count: usize,
-    fewest: usize,
-) -> Vec<[f64; 2]> {
+/// Medians of bins of equal width over a quantity, ascending, where a bin has rows enough.
+pub(super) fn medians(over: &[f64], values: &[f64], rows: impl Iterator<Item = usize> + Clone) -> Vec<[f64; 2]> {
     let (low, high) = least_and_most(rows.clone().map(|k| over[k]).filter(|x| x.is_finite()));
-    let mut bins: Vec<(Vec<f64>, f64)> = vec![(Vec::new(), 0.0); count];
+    let mut bins: Vec<(Vec<f64>, f64)> = vec![(Vec::new(), 0.0); MEDIANS];
     if high > low {
         for k in rows {
-            let place = ((over[k] - low) / (high - low) * count as f64) as usize;
-            let bin = &mut bins[place.min(count - 1)];
+            let place = ((over[k] - low) / (high - low) * MEDIANS as f64) as usize;
+            let bin = &mut bins[place.min(MEDIANS - 1)];
             bin.0.push(values[k]);
             bin.1 += over[k];
         }
     }
-    let enough = bins.iter_mut().filter(|(values, _)| values.len() >= fewest);
+    let enough = bins.iter_mut().filter(|(values, _)| values.len() >= FEWEST_IN_MEDIAN);
     enough.map(|(values, sum)| [*sum / values.len() as f64, median_of(values)]).collect()
 }
 
@@ -172,9 +166,9 @@ mod tests {
         assert_eq!(some_rows(3), [0, 1, 2]);
         let over: Vec<f64> = all.iter().map(|k| (*k % 100) as f64).collect();
         let values: Vec<f64> = over.iter().map(|x| 3.0 * x).collect();
-        let points = medians(&over, &values, 0..40_000, 24, 12);
+        let points = medians(&over, &values, 0..40_000);
         assert_eq!(points.len(), 24);
         assert!(points.iter().all(|[x, y]| (y - 3.0 * x).abs() < 3.0), "{points:?}");
-        assert_eq!(medians(&[1.0; 50], &[1.0; 50], 0..50, 9, 12), [] as [[f64; 2]; 0]);
+        assert_eq!(medians(&[1.0; 50], &[1.0; 50], 0..50), [] as [[f64; 2]; 0]);
     }
 }
