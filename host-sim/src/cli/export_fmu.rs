@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde::Serialize;
 
 use super::context::image_file;
@@ -21,8 +21,9 @@ const FMI: &str = "2.0";
 pub(super) struct FmuOptions {
     /// What the FMU simulates: compensation (the core over its table) or joint (motor, servo, drive and load) [default:
     /// compensation]
-    #[arg(long, value_enum, value_name = "MODEL", help_heading = "FMU", hide_possible_values = true)]
-    model: Option<FmuModel>,
+    #[arg(long, value_parser = ["compensation", "joint"], value_name = "MODEL", help_heading = "FMU")]
+    #[arg(hide_possible_values = true)]
+    model: Option<String>,
     /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file
     /// [default: antenna]
     #[arg(long, value_name = "SCENARIO", help_heading = "FMU")]
@@ -30,12 +31,6 @@ pub(super) struct FmuOptions {
     /// Library of flexspline-fmu to pack, repeatable for several platforms [default: those next to this program]
     #[arg(long, value_name = "FILE", help_heading = "FMU")]
     library: Vec<PathBuf>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum FmuModel {
-    Compensation,
-    Joint,
 }
 
 /// Result with `--json`.
@@ -94,18 +89,14 @@ impl FmuOptions {
             let file = tables.map_or("scenario".to_owned(), |file| file.display().to_string());
             Failure::BadInput(format!("{file}: {error}"))
         };
-        match (self.model.unwrap_or(FmuModel::Compensation), image) {
-            (FmuModel::Compensation, _) if self.scenario.is_some() => Err(Failure::BadInput(
-                "--scenario: the compensation alone has no mass; allowed with --model joint".to_owned(),
-            )),
-            (FmuModel::Compensation, None) => Err(Failure::BadInput(
-                "--tables: missing; needed for the compensation: an image as flexspline tables writes it".to_owned(),
-            )),
-            (FmuModel::Compensation, Some(image)) => compensation(image).map_err(of_table),
-            (FmuModel::Joint, image) => {
-                let flown = fly::scenario(self.scenario.as_deref().unwrap_or(USUAL_SCENARIO))?;
-                joint(&flown, image).map_err(of_table)
-            }
+        if self.model.as_deref() == Some("joint") {
+            let flown = fly::scenario(self.scenario.as_deref().unwrap_or(USUAL_SCENARIO))?;
+            return joint(&flown, image).map_err(of_table);
         }
+        if self.scenario.is_some() {
+            return Err(bad_input("--scenario: the compensation alone has no mass; allowed with --model joint"));
+        }
+        let missing = "--tables: missing; needed for the compensation: an image as flexspline tables writes it";
+        compensation(image.ok_or_else(|| bad_input(missing))?).map_err(of_table)
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::Path as FilePath;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flexspline::Direction;
 
 use super::{Context, Failure, bad_input, report, say};
@@ -62,8 +62,8 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     increment: Option<f64>,
     /// Which way pitch and turn go [default: forward]
-    #[arg(long, value_enum)]
-    direction: Option<DirectionOption>,
+    #[arg(long, value_parser = ["forward", "backward"])]
+    direction: Option<String>,
     /// Look for the ratcheting torque of the [data_sheet], up to the stated one; up to a minute more
     #[arg(long)]
     ratcheting: bool,
@@ -136,12 +136,6 @@ impl ModelOptions {
             ..SimulationSettings::new(self.generator, path)
         }
     }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum DirectionOption {
-    Forward,
-    Backward,
 }
 
 impl Simulate {
@@ -260,10 +254,8 @@ impl Simulate {
                 "--direction: the path has its own; allowed with --path pitch and turn".into(),
             ));
         }
-        let direction = match self.direction {
-            Some(DirectionOption::Backward) => Direction::Backward,
-            Some(DirectionOption::Forward) | None => Direction::Forward,
-        };
+        let direction =
+            if self.direction.as_deref() == Some("backward") { Direction::Backward } else { Direction::Forward };
         Ok(SimulationSettings { increment_rad: self.increment, direction, ..self.model.settings(path) })
     }
 
