@@ -16,7 +16,7 @@ use flexspline_design::tables::MissingSpring;
 use flexspline_design::tables::validate::{
     MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, validate,
 };
-use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 
@@ -96,29 +96,15 @@ fn added_spring(path: &Path, table: &Table<'_>) -> Result<Option<MissingSpring>,
     })
 }
 
-/// A table to be validated.
-struct CheckedTable<'a> {
-    path: &'a Path,
-    kind: GeneratorKind,
-    table: Table<'a>,
-    /// The spring that a data sheet added.
-    spring: Option<MissingSpring>,
-}
-
-impl<'a> CheckedTable<'a> {
-    /// The table in an image, if it is one of the drive.
-    fn of(path: &'a Path, image: &'a [u8], drive: &Drive) -> Result<CheckedTable<'a>, Failure> {
-        let table = table_of(path, image)?;
-        let kind = check_drive(drive, &table).map_err(bad_file(path))?;
-        Ok(CheckedTable { path, kind, table, spring: added_spring(path, &table)? })
-    }
-}
-
 impl Validate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
         let images = self.images()?;
-        let checked = images.iter().map(|(path, image)| CheckedTable::of(path, image, &drive));
+        let checked = images.iter().map(|(path, image)| {
+            let table = table_of(path, image)?;
+            let kind = check_drive(&drive, &table).map_err(bad_file(path))?;
+            Ok((kind, table, added_spring(path, &table)?))
+        });
         let checked = checked.collect::<Result<Vec<_>, Failure>>()?;
         let out = context.out()?;
         let settings = ValidationSettings {
@@ -133,7 +119,7 @@ impl Validate {
         let tables = checked
             .par_iter()
             .enumerate()
-            .map(|(k, CheckedTable { path, kind, table, spring })| {
+            .map(|(k, (kind, table, spring))| {
                 let settings = ValidationSettings { spring: *spring, ..settings };
                 validate(&drive, table, &settings, &mut |done, total| {
                     if let Ok(mut guard) = progress.lock() {
@@ -144,11 +130,12 @@ impl Validate {
                         bar.set(done, guess, kind.name());
                     }
                 })
-                .map_err(|error| match error {
-                    ValidateError::OtherDrive { .. } | ValidateError::UnknownGenerator => {
-                        Failure::BadInput(format!("{}: {error}", path.display()))
+                .map_err(|error| {
+                    let what = format!("{}: {error}", images[k].0.display());
+                    match error {
+                        ValidateError::OtherDrive { .. } | ValidateError::UnknownGenerator => Failure::BadInput(what),
+                        _ => Failure::Failed(what),
                     }
-                    other => Failure::Failed(format!("{}: {other}", path.display())),
                 })
             })
             .collect::<Result<Vec<Validation>, Failure>>()?;
@@ -174,7 +161,8 @@ impl Validate {
             };
             let fresh = format!("{} solver, {} mesh, seed {}", self.solver, self.mesh, self.seed);
             let inputs = images.iter().map(hashed).chain([("Fresh FEM".to_owned(), fresh)]).collect();
-            let known = checked.iter().zip(&report.tables).map(|(of, found)| (of.kind, of.table, None, Some(found)));
+            let known =
+                checked.iter().zip(&report.tables).map(|((kind, table, _), found)| (*kind, *table, None, Some(found)));
             let page = report::of_tables(context, (&drive, self.mesh), "validate", inputs, known.collect());
             report::write_to(&page, &page_path(out, &self.tables), &mut outputs)?;
         }
