@@ -243,13 +243,6 @@ pub fn write_whole(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Resu
     outputs.finish()
 }
 
-/// Writes records as CSV; the header is the names of their fields.
-pub fn write_csv<R: Serialize>(path: &Path, records: impl IntoIterator<Item = R>) -> Result<(), OutputError> {
-    let mut outputs = Outputs::new();
-    outputs.csv(path, records)?;
-    outputs.finish()
-}
-
 /// Temporary files are private; outputs are as readable as any other file.
 #[cfg(unix)]
 fn permit(path: &Path, mode: u32) -> io::Result<()> {
@@ -283,13 +276,6 @@ impl WholeFolder {
     /// Where its files are to be written until it is done.
     pub fn path(&self) -> &Path {
         &self.path.0
-    }
-
-    /// Puts the folder in its place; one that stood there goes.
-    pub fn finish(self) -> Result<(), OutputError> {
-        let mut outputs = Outputs::new();
-        outputs.folder(self);
-        outputs.finish()
     }
 
     /// Puts the folder in its place; the one that stood there is in `replaced`.
@@ -396,7 +382,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         let value = 0.1 + 0.2;
-        write_csv(&path, [Record { step: 3, error_arcsec: value, missing: None }]).unwrap();
+        let mut outputs = Outputs::new();
+        outputs.csv(&path, [Record { step: 3, error_arcsec: value, missing: None }]).unwrap();
+        outputs.finish().unwrap();
         let text = fs::read_to_string(&path).unwrap();
         let mut lines = text.lines();
         assert_eq!(lines.next(), Some("step,error_arcsec,missing"));
@@ -413,7 +401,9 @@ mod tests {
             let folder = WholeFolder::new(&target).unwrap();
             fs::write(folder.path().join(content), content).unwrap();
             assert!(!target.join(content).exists());
-            folder.finish().unwrap();
+            let mut outputs = Outputs::new();
+            outputs.folder(folder);
+            outputs.finish().unwrap();
             assert_eq!(names(&target), [content]);
         }
         drop(WholeFolder::new(&target).unwrap());

@@ -11,7 +11,7 @@ use super::export_fmu::FmuOptions;
 use super::export_playback::PlaybackOptions;
 use super::simulate::{ModelOptions, refused_or_failed, show, watched};
 use super::{Context, Failure, bad_input, say};
-use flexspline_base::output::{OutputError, write_csv, write_whole};
+use flexspline_base::output::{OutputError, Outputs, write_whole};
 use flexspline_design::simulate::{Observation, Path, PathPoint};
 use flexspline_export::{Deck, DeckSettings, SleeveDeck, outlines, write_vtu, write_whole_flexspline};
 use flexspline_mechanics::drive::Drive;
@@ -276,7 +276,9 @@ impl Export {
         let drive = context.drive()?;
         let points = outlines(&drive, self.model.generator, POINTS_PER_PIECE).map_err(bad_input)?;
         let file = context.out()?.join(format!("{}-outlines.csv", self.model.generator));
-        write_csv(&file, &points)?;
+        let mut outputs = Outputs::new();
+        outputs.csv(&file, &points)?;
+        outputs.finish()?;
         Ok(file)
     }
 }
