@@ -154,30 +154,11 @@ impl New {
         generators: &[GeneratorKind],
     ) -> Result<(Drive, Option<Stated>), Failure> {
         let generator = if let [one] = generators { *one } else { GeneratorKind::Cam };
-        let new = New {
-            file: PathBuf::new(),
-            kind: Some(NewKind::Drive),
-            teeth: None,
-            module: None,
-            ratio: None,
-            bore: None,
-            generator,
-            like: Some(name.to_owned()),
-            force: false,
-            plane: false,
-            no_run: false,
-        };
-        let Some((name, few)) = new.few()? else { return Ok((context.drive()?, None)) };
-        let mut made = as_sold(context, few.drive(&name).map_err(|error| refused(&error, true))?)?;
-        let sheet = new.sheet();
-        new.under_load(context, &mut made, sheet.as_ref())?;
+        let few = numbers_like(name, generator, None)?;
+        let mut made = as_sold(context, few.drive(name).map_err(|error| refused(&error, true))?)?;
+        let sheet = sheet_like(name);
+        run_under_load(context, generator, &mut made, sheet.as_ref())?;
         Ok((context.with_sets(made.drive)?, sheet))
-    }
-
-    /// The data sheet of the size that the drive is like.
-    fn sheet(&self) -> Option<Stated> {
-        let (series, size, ratio) = self.like.as_deref().and_then(size_and_ratio)?;
-        catalogue::sheet(series, size, ratio)
     }
 
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
@@ -197,11 +178,11 @@ impl New {
         };
         let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
         let files = self.files(kind)?;
-        let data_sheet = self.sheet().filter(|_| kind == NewKind::Drive);
+        let data_sheet = self.like.as_deref().and_then(sheet_like).filter(|_| kind == NewKind::Drive);
         let mut made = made;
         let under_load = match &mut made {
             Some(made) if kind == NewKind::Drive && !self.no_run => {
-                self.under_load(context, made, data_sheet.as_ref())?
+                run_under_load(context, self.generator, made, data_sheet.as_ref())?
             }
             _ => None,
         };
@@ -302,46 +283,6 @@ impl New {
         lines.iter().map(|line| format!("\n{line}")).collect()
     }
 
-    /// Runs a drive of one's own under its rated load, and lowers its tips until they pass one another freely. Nothing
-    /// of a drive that binds as drawn.
-    fn under_load(
-        &self,
-        context: &Context,
-        made: &mut MadeDrive,
-        sheet: Option<&Stated>,
-    ) -> Result<Option<UnderLoad>, Failure> {
-        let drive = context.with_sets(made.drive.clone())?;
-        if !Clearance::of(&drive).map_err(bad_input)?.clear.contains(&self.generator) {
-            return Ok(None);
-        }
-        let generator = self.generator;
-        let torque_n_m = Stated::rated_n_m(sheet, &drive, generator);
-        let progress = context.progress("run under load");
-        let mut runs = 0;
-        let mut report = |what: &str| {
-            progress.set(runs, 0, what);
-            runs += 1;
-        };
-        let relief = relieve_tips(&drive, generator, torque_n_m, !context.sets_field(TIP_RADIUS), &mut report);
-        let mut under = UnderLoad { torque_n_m, generator, tips_lowered_mm: 0.0, tip_contact: None, not_solved: None };
-        match relief {
-            Ok(relief) => {
-                if relief.lowered_mm > 0.0 {
-                    made.drive.flexspline.tip_radius_mm = relief.tip_radius_mm;
-                    for (_, formula) in made.formulas.iter_mut().filter(|(path, _)| *path == TIP_RADIUS) {
-                        *formula += &format!(
-                            ", lowered by {:.4} mm: so tips pass one another freely under {torque_n_m} N·m",
-                            relief.lowered_mm
-                        );
-                    }
-                }
-                (under.tips_lowered_mm, under.tip_contact) = (relief.lowered_mm, relief.left);
-            }
-            Err(error) => under.not_solved = Some(error.to_string()),
-        }
-        Ok(Some(under))
-    }
-
     /// Whether S-shaped teeth are asked for, which are drawn for the cam.
     fn asks_for_s_teeth(&self, context: &Context) -> Result<bool, Failure> {
         let asked = context.set_to(PROFILE).is_some_and(|profile| profile.eq_ignore_ascii_case("s"));
@@ -358,26 +299,16 @@ impl New {
     /// Name and numbers of a drive of one's own, if it is asked for.
     fn few(&self) -> Result<Option<(String, FewNumbers)>, Failure> {
         let bad = |what: String| Err(Failure::BadInput(what));
-        let few = |teeth, module_mm| FewNumbers { teeth, module_mm, bore_mm: self.bore, generator: self.generator };
         if let Some(name) = &self.like {
-            let Some((series, size, ratio)) = size_and_ratio(name) else {
-                return bad(format!(
-                    "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to \
-                     320; a built-in drive goes with --drive"
-                ));
-            };
-            if catalogue::series(series).is_none() {
-                let unknown =
-                    UnknownName { what: "--like: found the series", found: series.to_owned(), known: &SERIES };
-                return Err(bad_input(unknown));
-            }
+            let few = numbers_like(name, self.generator, self.bore)?;
+            let ratio = few.teeth / 2;
             if self.ratio.is_some_and(|asked| asked.abs() != f64::from(ratio)) {
                 return bad(format!(
                     "--ratio: found {:?}, allowed: {ratio}, as {name} has it",
                     self.ratio.unwrap_or_default()
                 ));
             }
-            return Ok(Some((name.clone(), few(2 * ratio, CATALOGUE_MM_PER_SIZE * size / f64::from(2 * ratio)))));
+            return Ok(Some((name.clone(), few)));
         }
         let Some(module_mm) = self.module else {
             if self.bore.is_some() || self.ratio.is_some() {
@@ -407,7 +338,7 @@ impl New {
         };
         Ok(Some((
             self.file.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
-            few(teeth, module_mm),
+            FewNumbers { teeth, module_mm, bore_mm: self.bore, generator: self.generator },
         )))
     }
 
@@ -448,6 +379,67 @@ const TIP_RADIUS: &str = "flexspline.tip_radius_mm";
 
 /// The field that says which teeth.
 const PROFILE: &str = "flexspline.profile";
+
+/// The numbers of a drive like a size of a catalogue.
+fn numbers_like(name: &str, generator: GeneratorKind, bore_mm: Option<f64>) -> Result<FewNumbers, Failure> {
+    let Some((series, size, ratio)) = size_and_ratio(name) else {
+        return Err(Failure::BadInput(format!(
+            "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to 320; a \
+             built-in drive goes with --drive"
+        )));
+    };
+    if catalogue::series(series).is_none() {
+        let unknown = UnknownName { what: "--like: found the series", found: series.to_owned(), known: &SERIES };
+        return Err(bad_input(unknown));
+    }
+    let teeth = 2 * ratio;
+    Ok(FewNumbers { teeth, module_mm: CATALOGUE_MM_PER_SIZE * size / f64::from(teeth), bore_mm, generator })
+}
+
+/// The data sheet of a size of a catalogue, if it is at hand.
+fn sheet_like(name: &str) -> Option<Stated> {
+    let (series, size, ratio) = size_and_ratio(name)?;
+    catalogue::sheet(series, size, ratio)
+}
+
+/// Runs a drive of one's own under its rated load, and lowers its tips until they pass one another freely. Nothing
+/// of a drive that binds as drawn.
+fn run_under_load(
+    context: &Context,
+    generator: GeneratorKind,
+    made: &mut MadeDrive,
+    sheet: Option<&Stated>,
+) -> Result<Option<UnderLoad>, Failure> {
+    let drive = context.with_sets(made.drive.clone())?;
+    if !Clearance::of(&drive).map_err(bad_input)?.clear.contains(&generator) {
+        return Ok(None);
+    }
+    let torque_n_m = Stated::rated_n_m(sheet, &drive, generator);
+    let progress = context.progress("run under load");
+    let mut runs = 0;
+    let mut report = |what: &str| {
+        progress.set(runs, 0, what);
+        runs += 1;
+    };
+    let relief = relieve_tips(&drive, generator, torque_n_m, !context.sets_field(TIP_RADIUS), &mut report);
+    let mut under = UnderLoad { torque_n_m, generator, tips_lowered_mm: 0.0, tip_contact: None, not_solved: None };
+    match relief {
+        Ok(relief) => {
+            if relief.lowered_mm > 0.0 {
+                made.drive.flexspline.tip_radius_mm = relief.tip_radius_mm;
+                for (_, formula) in made.formulas.iter_mut().filter(|(path, _)| *path == TIP_RADIUS) {
+                    *formula += &format!(
+                        ", lowered by {:.4} mm: so tips pass one another freely under {torque_n_m} N·m",
+                        relief.lowered_mm
+                    );
+                }
+            }
+            (under.tips_lowered_mm, under.tip_contact) = (relief.lowered_mm, relief.left);
+        }
+        Err(error) => under.not_solved = Some(error.to_string()),
+    }
+    Ok(Some(under))
+}
 
 /// Head of a file: how its teeth clear, and what no catalogue prints.
 fn head(teeth: Option<&Clearance>) -> String {
