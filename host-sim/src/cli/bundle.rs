@@ -71,7 +71,7 @@ impl BundleCommand {
         let tables = self.read_tables()?;
         let bundle = Bundle::new(tables, &self.tables.display().to_string()).map_err(bad_input)?;
         let (libraries, missing) = self.libraries(context)?;
-        let (files, manifest) = bundle.with(libraries).files();
+        let (files, manifest) = bundle.files(&libraries);
         let archive = self.write(&out, &files)?;
         let bundled = Bundled {
             folder: out.display().to_string(),

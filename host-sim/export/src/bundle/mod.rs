@@ -201,11 +201,10 @@ pub struct FileEntry {
     pub blake3: String,
 }
 
-/// Tables and libraries.
+/// Tables, at least one, each with a name of its own.
 #[derive(Debug)]
 pub struct Bundle {
     tables: Vec<BundledTable>,
-    libraries: Vec<BundleLibrary>,
 }
 
 impl Bundle {
@@ -223,22 +222,16 @@ impl Bundle {
                 return Err(BundleError::Name { first, second, name: table.name.clone() });
             }
         }
-        Ok(Bundle { tables, libraries: Vec::new() })
+        Ok(Bundle { tables })
     }
 
-    /// With static libraries.
+    /// Path and contents of every file with these static libraries, the manifest last.
     #[must_use]
-    pub fn with(self, libraries: Vec<BundleLibrary>) -> Bundle {
-        Bundle { libraries, ..self }
-    }
-
-    /// Path and contents of every file, the manifest last.
-    #[must_use]
-    pub fn files(&self) -> (Vec<(String, Vec<u8>)>, Manifest) {
+    pub fn files(&self, libraries: &[BundleLibrary]) -> (Vec<(String, Vec<u8>)>, Manifest) {
         let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
         let mut put = |path: String, contents: Vec<u8>| drop(files.insert(path, contents));
         FIXED.iter().for_each(|(path, text)| put((*path).to_owned(), (*text).into()));
-        TEMPLATES.iter().for_each(|(path, text)| put((*path).to_owned(), self.filled_in(text).into()));
+        TEMPLATES.iter().for_each(|(path, text)| put((*path).to_owned(), self.filled_in(text, libraries).into()));
         put("include/flexspline_table.h".to_owned(), "#include \"../c99/flexspline_table.h\"\n".into());
         put("vectors/vectors.h".to_owned(), vectors::header(&self.tables).into());
         // Arduino compiles what is below src, and nothing else.
@@ -258,17 +251,17 @@ impl Bundle {
             put(format!("vectors/{name}.csv"), vectors::csv(&checked, STEPS).into());
             put(format!("vectors/{name}_vectors.h"), vectors::array(name, &checked, STEPS).into());
         }
-        for library in &self.libraries {
+        for library in libraries {
             put(format!("lib/{}/libflexspline.a", library.target), library.archive.clone());
         }
-        let manifest = self.manifest(&files);
+        let manifest = self.manifest(&files, libraries);
         let mut files: Vec<(String, Vec<u8>)> = files.into_iter().collect();
         let text = serde_json::to_string_pretty(&manifest).expect("names and numbers");
         files.push((MANIFEST.to_owned(), (text + "\n").into_bytes()));
         (files, manifest)
     }
 
-    fn manifest(&self, files: &BTreeMap<String, Vec<u8>>) -> Manifest {
+    fn manifest(&self, files: &BTreeMap<String, Vec<u8>>, libraries: &[BundleLibrary]) -> Manifest {
         let table = |table: &BundledTable| {
             let checked = table.checked();
             TableEntry {
@@ -289,13 +282,13 @@ impl Bundle {
             version: VERSION.to_owned(),
             table_format: Table::FORMAT_VERSION,
             tables: self.tables.iter().map(table).collect(),
-            targets: self.libraries.iter().map(|library| library.target.clone()).collect(),
+            targets: libraries.iter().map(|library| library.target.clone()).collect(),
             files: files.iter().map(file).collect(),
         }
     }
 
     /// A template with its names, versions and lists.
-    fn filled_in(&self, template: &str) -> String {
+    fn filled_in(&self, template: &str, libraries: &[BundleLibrary]) -> String {
         let sources = |around: &dyn Fn(String) -> String| {
             let both = self.tables.iter().flat_map(|table| {
                 ["", "_second"].map(|suffix| around(format!("tables/flexspline_{}{suffix}.c", table.name)))
@@ -306,7 +299,7 @@ impl Bundle {
         for table in &self.tables {
             let _ = writeln!(table_list, "- `tables/{}.fxt`: {}", table.stem, table.about());
         }
-        let targets: Vec<String> = self.libraries.iter().map(|library| format!("`{}`", library.target)).collect();
+        let targets: Vec<String> = libraries.iter().map(|library| format!("`{}`", library.target)).collect();
         let target_list = if targets.is_empty() { "none".to_owned() } else { targets.join(", ") };
         template
             .replace("@VERSION@", VERSION)
