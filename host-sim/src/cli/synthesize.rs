@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::context::{Context, quoted, table_image, table_of};
-use super::tables::fresh_table;
+use super::tables::coarse_table;
 use super::{Failure, bad_input, say, within};
 use flexspline_base::output::Outputs;
 use flexspline_identify::causes::{ParameterSpec, Usual};
@@ -21,7 +21,6 @@ use flexspline_identify::synthesize::{
     within_temperatures,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
-use flexspline_mechanics::mesh::MeshLevel;
 
 /// Make synthetic measurements: a simulated drive with effects, noise and sensors of your choice
 ///
@@ -266,7 +265,7 @@ impl Synthesize {
                 table_of(&path, &image)?;
                 (image, Some(path.display().to_string()))
             }
-            None => (fresh_table(context, drive, self.generator, MeshLevel::Coarse)?.image, None),
+            None => (coarse_table(context, drive, self.generator)?.image, None),
         };
         let table = Table::check(&image).map_err(|error| Failure::Failed(error.to_string()))?;
         let nominal = Nominal::of_table(&table);

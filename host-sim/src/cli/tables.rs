@@ -401,15 +401,10 @@ fn by_fem(
         .collect()
 }
 
-/// A table made by FEM now, with the command's defaults except for the mesh.
-pub(super) fn fresh_table(
-    context: &Context,
-    drive: &Drive,
-    kind: GeneratorKind,
-    mesh: MeshLevel,
-) -> Result<MadeTable, Failure> {
+/// A table made by FEM now on the coarse mesh, else with the command's defaults.
+pub(super) fn coarse_table(context: &Context, drive: &Drive, kind: GeneratorKind) -> Result<MadeTable, Failure> {
     let mut settings = TableSettings::for_generator(drive, kind);
-    settings.solver.mesh = mesh;
+    settings.solver.mesh = MeshLevel::Coarse;
     by_fem(context, drive, &[(kind, settings)]).remove(0)
 }
 
