@@ -65,11 +65,6 @@ pub fn less_mean(animation: &Animation) -> Vec<[f64; 2]> {
     (0..=FRAMES).map(|k| [degrees(animation, k as i64), e[k % FRAMES] - mean]).collect()
 }
 
-/// The generator angle over a pitch, linked with the drive.
-pub(super) fn over_pitch() -> ChartAxis {
-    ChartAxis::linked("Generator from the beginning of a pitch")
-}
-
 /// The drive to scale; `state` says under what load it turns, and which way.
 pub fn drive_figure(state: &str) -> Figure {
     let caption = format!(
@@ -129,7 +124,7 @@ pub(super) fn stress_lines(animation: &Animation) -> Lines {
 
 /// Stress and pressures over a pitch, a chart to each choice.
 pub(super) fn stress_figure(charts: Vec<(String, Lines)>) -> PageBlock {
-    let axes = [over_pitch(), ChartAxis::new("Stress, pressure", PageQuantity::Stress)];
+    let axes = [ChartAxis::over_pitch(), ChartAxis::new("Stress, pressure", PageQuantity::Stress)];
     let caption = format!("At the load of figure 1. {STRESSES_ARE}");
     PageBlock::lines("stress", "Largest stress and pressures over a pitch", caption, axes, charts)
 }

@@ -7,8 +7,8 @@ use serde_json::{Map, Value, json};
 
 use super::animation::{Animation, AnimationError, FRAMES};
 use super::drive_figures::{
-    apart, caution_words, drive_figure, less_mean, mean_arcsec, over_pitch, sharing_figure, sharing_lines,
-    sheet_section, sizes_section, sleeve_figure, stress_figure, stress_lines,
+    apart, caution_words, drive_figure, less_mean, mean_arcsec, sharing_figure, sharing_lines, sheet_section,
+    sizes_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
     ChartAxis, ChartSeries, Choice, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection, RichText,
@@ -531,7 +531,7 @@ fn motion_section(known: &[DriveKnown<'_>]) -> PageSection {
             "Output angle less generator angle over the ratio, by the table, at three loads in both directions; dots \
              are fresh FEM, the states that figure 1 shows. It repeats with every pitch of the flexspline. The mean \
              is in figure 3.",
-            [over_pitch(), error("Output error less mean")],
+            [ChartAxis::over_pitch(), error("Output error less mean")],
             charts(known, |k| Some(k.ripple())),
         ),
         PageBlock::lines(

@@ -9,7 +9,7 @@
 //!   picture, then what to do next; all else is folded.
 //! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as
 //!   [`RichText::error`] in text, and as [`PageQuantity::Error`] on an axis.
-//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`ChartAxis::linked`]
+//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`ChartAxis::over_pitch`]
 //!   turn its generator, and are turned by it.
 
 use std::fmt;
@@ -447,9 +447,9 @@ impl ChartAxis {
         ChartAxis { label: label.into(), quantity, linked: false, stretched: None }
     }
 
-    /// The generator angle over a pitch, degrees, linked with the drive.
-    pub fn linked(label: impl Into<String>) -> ChartAxis {
-        ChartAxis { label: label.into(), quantity: PageQuantity::Degree, linked: true, stretched: None }
+    /// The generator angle over a pitch, linked with the drive.
+    pub fn over_pitch() -> ChartAxis {
+        ChartAxis { linked: true, ..ChartAxis::new("Generator from the beginning of a pitch", PageQuantity::Degree) }
     }
 
     /// This axis, linear within `within` of zero and logarithmic beyond.

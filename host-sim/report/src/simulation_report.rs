@@ -8,9 +8,8 @@ use serde_json::{Map, json};
 
 use super::animation::{Animation, Passing, flank_forces};
 use super::drive_figures::{
-    BEARS, OfRow, STRESSES, STRESSES_ARE, apart, caution_words, drive_figure, less_mean, mean_arcsec, over_pitch,
-    sharing_axes, sharing_figure, sharing_lines, sheet_section, sizes_section, sleeve_figure, stress_figure,
-    stress_lines,
+    BEARS, OfRow, STRESSES, STRESSES_ARE, apart, caution_words, drive_figure, less_mean, mean_arcsec, sharing_axes,
+    sharing_figure, sharing_lines, sheet_section, sizes_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
     ChartAxis, ChartSeries, Choice, FieldMap, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock, PageQuantity,
@@ -193,7 +192,7 @@ impl RunKnown<'_> {
             "ripple",
             "Error over one tooth pitch, less its mean",
             caption.error(mean_arcsec(motion), 4).plain("."),
-            [over_pitch(), ChartAxis::new("Output error less mean", PageQuantity::Error)],
+            [ChartAxis::over_pitch(), ChartAxis::new("Output error less mean", PageQuantity::Error)],
             self.chart(Lines::of(vec![series])),
         );
         let mut blocks = vec![PageBlock::Figure(drive_figure(&format!("under {load} N·m, turning {way}"))), ripple];

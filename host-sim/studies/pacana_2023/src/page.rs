@@ -145,7 +145,7 @@ fn errors(r: &Reproduction, animations: &[Animation]) -> PageSection {
             "Error over one tooth pitch, less its mean",
             "The states of figure 1, after start-up. This repeats with every tooth pitch, 59.8 times in the paper's 2 \
              rad.",
-            [ChartAxis::linked("Generator from the beginning of a pitch"), error()],
+            [ChartAxis::over_pitch(), error()],
             animations.iter().map(ripple).collect(),
         ));
     }
