@@ -2,7 +2,7 @@
 
 use flexspline::Direction;
 use flexspline_design::simulate::{
-    Path, PathPoint, SimulateError, SimulationSettings, Summary, read_path, simulate as run_along,
+    Path, PathPoint, SimulateError, SimulationSettings, read_path, simulate as run_along,
 };
 use flexspline_mechanics::stepping::SolverSettings;
 use numpy::PyReadonlyArray1;
@@ -82,11 +82,7 @@ pub fn simulate<'py>(
         })
         .map_err(|error: SimulateError| PythonFailure::of(&error, error.is_bad_input()))
     })?;
-    Ok((columns(py, &simulation.rows)?, summary_json(&simulation.summary)?))
-}
-
-fn summary_json(summary: &Summary) -> PyResult<String> {
-    serde_json::to_string(summary).map_err(bad)
+    Ok((columns(py, &simulation.rows)?, serde_json::to_string(&simulation.summary).map_err(bad)?))
 }
 
 fn path_points(points: &Points<'_>) -> PyResult<Vec<PathPoint>> {
