@@ -69,10 +69,10 @@ pub struct JointPlant {
     pub rate_rad_s: [f64; PARTS],
     /// Energies since the start.
     pub energy: Energy,
-    /// Temperature of the drive, °C.
-    temperature_c: f64,
+    /// Factor of the cold on the friction.
     cold: f64,
-    meshed: Meshed,
+    /// Torques of the drive now.
+    pub meshed: Meshed,
     middle: Meshed,
     /// Where the step began.
     near: Near,
@@ -94,7 +94,6 @@ impl JointPlant {
             angle_rad: [0.0; PARTS],
             rate_rad_s: [0.0; PARTS],
             energy: Energy::default(),
-            temperature_c,
             mean: [0.0; PARTS],
             before: [0.0; PARTS],
         }
@@ -109,7 +108,6 @@ impl JointPlant {
 
     /// Another temperature of the lubricant, °C.
     pub fn set_temperature(&mut self, temperature_c: f64) {
-        self.temperature_c = temperature_c;
         self.cold = self.settings.friction.cold(temperature_c);
     }
 
@@ -129,11 +127,6 @@ impl JointPlant {
     /// Torque in the mesh now, N·m.
     pub fn mesh_n_m(&self) -> f64 {
         self.meshed.torque_n_m
-    }
-
-    /// Torques of the drive now.
-    pub fn meshed(&self) -> &Meshed {
-        &self.meshed
     }
 
     /// Energy that can come back, J: of motion and in the mesh.

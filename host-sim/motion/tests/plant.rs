@@ -28,10 +28,10 @@ fn bare(spring: Spring, lines: Vec<GearLine>) -> PlantSettings {
 /// Times at which the twist crosses zero upward, by straight lines between steps.
 fn crossings(plant: &mut JointPlant, step_s: f64, seconds: f64) -> Vec<f64> {
     let mut times = Vec::new();
-    let mut before = plant.meshed().twist_rad;
+    let mut before = plant.meshed.twist_rad;
     for k in 1..=(seconds / step_s).round() as usize {
         plant.step(step_s, 0.0, 0.0);
-        let now = plant.meshed().twist_rad;
+        let now = plant.meshed.twist_rad;
         if before < 0.0 && now >= 0.0 {
             times.push((k as f64 - now / (now - before)) * step_s);
         }
@@ -252,7 +252,7 @@ fn friction_by_load_neither_damps_nor_drives_a_swing_whatever_the_step() {
             plant.step(step_s, -load_n_m * (1.0 - share * way), load_n_m);
             // Over more than a period at the end.
             if step >= steps(0.49) {
-                left = left.max((plant.meshed().twist_rad - still).abs());
+                left = left.max((plant.meshed.twist_rad - still).abs());
             }
         }
         let theory = (-0.5 * decay).exp();
