@@ -178,7 +178,7 @@ pub struct Flown {
 #[derive(Clone, Debug)]
 pub struct Flight {
     /// By controller.
-    pub flown: Vec<Flown>,
+    pub flown: [Flown; CONTROLLERS.len()],
     /// No compensation, of a drive without errors: what of the velocity ripple is not the drive's.
     pub flawless: Flown,
     /// Whether the servo is stable with this load, and the compensated joint comes to rest after a knock as the one
@@ -277,14 +277,6 @@ pub enum FlightError {
     },
 }
 
-/// Flies a scenario.
-///
-/// # Errors
-/// [`FlightError`].
-pub fn fly(scenario: &Scenario, unit: &JointUnit) -> Result<Flight, FlightError> {
-    fly_watched(scenario, unit, None, &|| {})
-}
-
 /// Flies a scenario, with the image of a table that was made before, or one made for it; `each_second` is called by
 /// each controller's joint for each second that it flew.
 ///
@@ -300,16 +292,16 @@ pub fn fly_watched(
     let flawless = LaneParts { unit: unit.flawless(), ..made.clone() };
     let (flown, flawless) = std::thread::scope(|threads| {
         let start = |made, kind| threads.spawn(move || lane(made, kind, each_second));
-        let flying: Vec<_> = (0..CONTROLLERS.len()).map(|kind| start(&made, kind)).collect();
+        let flying: [_; CONTROLLERS.len()] = core::array::from_fn(|kind| start(&made, kind));
         let flawless = start(&flawless, 0);
         let landed = |lane: ScopedJoinHandle<'_, _>| lane.join().unwrap_or_else(|panic| resume_unwind(panic));
-        (flying.into_iter().map(landed).collect::<Result<Vec<Flown>, _>>(), landed(flawless))
+        (flying.map(landed), landed(flawless))
     });
-    let (flown, flawless) = (flown?, flawless?);
+    let [none, fourier, by_direction, compensated, ideal] = flown;
     let margin = made.masses.servo(&scenario.servo);
     Ok(Flight {
-        flown,
-        flawless,
+        flown: [none?, fourier?, by_direction?, compensated?, ideal?],
+        flawless: flawless?,
         stable: margin.stable && stable(&made)?,
         torque: made.torque,
         bandwidth_hz: made.bandwidth_hz,
@@ -323,7 +315,7 @@ pub fn fly_watched(
 /// Flies one controller alone.
 ///
 /// # Errors
-/// As [`fly`].
+/// As [`fly_watched`].
 pub fn fly_one(scenario: &Scenario, unit: &JointUnit, controller: usize) -> Result<Flown, FlightError> {
     lane(&made(scenario, unit, None)?, controller, &|| {})
 }
@@ -971,7 +963,7 @@ const AT_REST_RAD_S: f64 = 2e-5;
 /// where a torque in the mesh may not be used.
 ///
 /// # Errors
-/// As [`fly`].
+/// As [`fly_watched`].
 pub fn comes_to_rest(scenario: &Scenario, unit: &JointUnit) -> Result<(bool, Option<f64>), FlightError> {
     let made = made(scenario, unit, None)?;
     let used = made.torque == scenario.torque;

@@ -193,19 +193,18 @@ pub type Row = [f64; 2];
 /// Where an ideal leaves more than this of the error, no share of what it removes is given. *Guess*.
 const IDEAL_REMOVES: f64 = 0.98;
 
-fn by_controller<T: Copy>(flight: &Flight, value: impl Fn(&Flown) -> T) -> Option<ByController<T>> {
-    let values: Vec<T> = flight.flown.iter().map(value).collect();
-    let &[none, fourier, fourier_by_direction, compensated, ideal] = values.as_slice() else { return None };
-    Some(ByController { none, fourier, fourier_by_direction, compensated, ideal })
+fn by_controller<T: Copy>(flight: &Flight, value: impl Fn(&Flown) -> T) -> ByController<T> {
+    let [none, fourier, fourier_by_direction, compensated, ideal] = flight.flown.each_ref().map(value);
+    ByController { none, fourier, fourier_by_direction, compensated, ideal }
 }
 
-/// The numbers of a flight; `None` if a controller is missing.
+/// The numbers of a flight.
 #[must_use]
-pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
+pub fn results(flown: &super::Flown, flight: &Flight) -> Results {
     let scenario = &flown.scenario;
-    let rms = by_controller(flight, |flown| flown.error.rms())?;
+    let rms = by_controller(flight, |flown| flown.error.rms());
     let digest = flight.flown.iter().fold(0_u64, |sum, flown| sum.rotate_left(9) ^ flown.digest);
-    let core = flight.flown.get(COMPENSATED)?;
+    let core = &flight.flown[COMPENSATED];
     let current = flight.torque == TorqueKnown::Current;
     let mut results = Results {
         scenario: scenario.name.clone(),
@@ -214,15 +213,11 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
         table: name_of(&TableKnown::NAMES, scenario.table).to_owned(),
         seconds: scenario.seconds(),
         rms_arcsec: rms,
-        max_arcsec: by_controller(flight, |flown| flown.error.largest())?,
-        velocity_ripple: by_controller(flight, |flown| flown.ripple.rms_if_any())?,
+        max_arcsec: by_controller(flight, |flown| flown.error.largest()),
+        velocity_ripple: by_controller(flight, |flown| flown.ripple.rms_if_any()),
         velocity_ripple_floor: flight.flawless.ripple.rms_if_any(),
-        mesh_n_m: by_controller(flight, |flown| flown.mesh.largest())?,
-        settle_s: if stands(scenario).next().is_some() {
-            by_controller(flight, |flown| settle_s(scenario, flown))
-        } else {
-            None
-        },
+        mesh_n_m: by_controller(flight, |flown| flown.mesh.largest()),
+        settle_s: (stands(scenario).next().is_some()).then(|| by_controller(flight, |flown| settle_s(scenario, flown))),
         removed: (rms.ideal < IDEAL_REMOVES * rms.none).then(|| (rms.none - rms.compensated) / (rms.none - rms.ideal)),
         stable: flight.stable,
         bandwidth_hz: flight.bandwidth_hz,
@@ -237,7 +232,7 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
     };
     let way_out = if results.servo_is_sound() { String::new() } else { way_out(flight, scenario) };
     results.remarks = results.against(&way_out);
-    Some(results)
+    results
 }
 
 /// A pace changes by a fifth a step, down to a tenth in the end; that of the speed loop as far up, too, where it is too

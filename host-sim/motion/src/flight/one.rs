@@ -6,7 +6,7 @@ use crate::plant::JointPlant;
 use crate::scenario::{Moment, Scenario};
 use flexspline::Quality;
 
-/// A joint with mass, its servo, and what commands it; as [`super::fly`] flies it, tick by tick.
+/// A joint with mass, its servo, and what commands it; as [`super::fly_watched`] flies it, tick by tick.
 pub struct OneJoint {
     made: LaneParts,
     lane: JointLane,
