@@ -36,7 +36,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 TorqueReading::InMesh(torque) => (true, torque),
             };
             tape += &format!(
-                "({generator}, {target}, {rate:?}, {acceleration:?}, {backward}, {in_mesh}, {torque:?}, {inertia_n_m:?}),\n"
+                "({generator}, {target}, {rate:?}, {acceleration:?}, {backward}, {in_mesh}, {torque:?}, \
+                 {inertia_n_m:?}),\n"
             );
             hash = hashed(hash, given);
             if tick % LINE_TICKS == LINE_TICKS - 1 {

@@ -6,15 +6,13 @@
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use flexspline::{
-    Direction, GeneratorAngle, Images, Limits, OutputAngle, Store, Table, TorqueReading, TorqueSettings,
-};
+use flexspline::{Direction, GeneratorAngle, Images, Limits, OutputAngle, Store, Table, TorqueReading, TorqueSettings};
 use flexspline_firmware::on_board::{HASH_START, LINE_TICKS, OnBoard, OnBoardInput, OnBoardSettings, hashed, line};
 use flexspline_firmware::{Console, finish, twice};
 
 static IMAGE: [&[u8]; 2] = twice!(concat!(env!("FLEXSPLINE_TABLES"), "/joint.fxt"));
-/// Counts of generator and target, rate and acceleration of the target, whether it moves backward, whether the torque is
-/// that in the mesh, the torque, and that for the load's inertia.
+/// Counts of generator and target, rate and acceleration of the target, whether it moves backward, whether the torque
+/// is that in the mesh, the torque, and that for the load's inertia.
 type Tick = (i64, i64, f32, f32, bool, bool, f32, f32);
 /// Name, settings of the core, and inputs of a flight.
 static TAPES: [(&str, OnBoardSettings, &[Tick]); 2] = [
@@ -43,8 +41,8 @@ fn fly(settings: OnBoardSettings, ticks: &[Tick], store: &mut Store) -> Option<(
     store.activate(&images, &drive, settings.temperature_c).ok()?;
     let mut on_board = OnBoard::new(drive, &settings).ok()?;
     let mut hash = HASH_START;
-    for (tick, &(generator, target, rate, acceleration, backward, in_mesh, torque, inertia_n_m)) in ticks.iter().enumerate()
-    {
+    for (tick, input) in ticks.iter().enumerate() {
+        let &(generator, target, rate, acceleration, backward, in_mesh, torque, inertia_n_m) = input;
         let input = OnBoardInput {
             generator: GeneratorAngle::from_counts(generator),
             target: OutputAngle::from_counts(target),
