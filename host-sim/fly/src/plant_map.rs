@@ -43,8 +43,8 @@ impl GearMap {
         Self::parse(text).expect("the files of plant/ are maps")
     }
 
-    /// From the text of a file: a comment with the teeth, a header, then one line for each temperature and flank torque,
-    /// with errors in arc-seconds. `None` if it is no map.
+    /// From the text of a file: a comment with the teeth, a header, then one line for each temperature and flank
+    /// torque, with errors in arc-seconds. `None` if it is no map.
     fn parse(text: &str) -> Option<Self> {
         let mut lines = text.lines();
         let (_, teeth) = lines.next()?.split_once("teeth=")?;

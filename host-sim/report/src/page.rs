@@ -9,7 +9,7 @@
 //!   picture, then what to do next; all else is folded.
 //! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as
 //!   [`RichText::error`] in text, and as [`PageQuantity::Error`] on an axis.
-//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`ChartAxis::over_pitch`]
+//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is [`ChartAxis::over_pitch`]
 //!   turn its generator, and are turned by it.
 
 use std::fmt;
