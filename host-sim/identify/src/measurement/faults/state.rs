@@ -23,6 +23,8 @@ const HUBER: f64 = 2.5;
 /// Prior standard deviation of a coefficient, in units of what one row of error 1 says of it: so wide that rows alone
 /// decide, where they do. *Guess*: 1e-9 of their information.
 const WIDE: f64 = 31_622.776_601_683_8;
+/// A column is at least of this size, in its own unit. *Guess*: smaller is round-off.
+const LEAST_SIZE: f64 = 1e-12;
 
 /// The error freed of what the state says, where there are rows enough.
 pub(super) fn left(log: &Log, gear: &Gear) -> Option<Vec<f64>> {
@@ -76,7 +78,7 @@ pub(super) fn left(log: &Log, gear: &Gear) -> Option<Vec<f64>> {
         for ((columns, error), weight) in rows.iter().zip(&weights) {
             gram.add_row(&[&columns[..], &[*error]].concat(), *weight);
         }
-        let wide = |k: usize| Prior { mean: 0.0, std: WIDE / gram.at(k, k).sqrt().max(f64::MIN_POSITIVE) };
+        let wide = |k: usize| Prior { mean: 0.0, std: WIDE / gram.at(k, k).sqrt().max(LEAST_SIZE) };
         let priors: Vec<Prior> = (0..width).map(wide).collect();
         coefficients = solve(&gram.among(&everything), &priors, 1.0)?.coefficients;
         let left: Vec<f64> = rows.iter().map(|(columns, error)| error - dot(columns, &coefficients)).collect();
