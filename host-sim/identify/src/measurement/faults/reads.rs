@@ -270,8 +270,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     let scatters = jitter.as_ref().map(|Jitter { noise, rows }| {
         let of_time = jitter_ms.map_or(format!("{rows:.4} rows"), |ms| format!("{ms:.3} ms"));
         format!(
-            "the time between them scatters by {of_time}, {:.1} arcsec at full speed and {:.1} of noise: fast rows \
-             are weighted down, to {:.2} of the weight of a row at rest",
+            "the time between them scatters by {of_time}, {:.1} arcsec at full speed and {:.1} of noise: a fast row \
+             is worth {:.2} of one at rest",
             size_rad / ARCSEC,
             noise / ARCSEC,
             noise * noise / (noise * noise + size_rad * size_rad)
