@@ -12,10 +12,12 @@ use toml::de::{DeTable, DeValue};
 
 use crate::calibrate::{GOLDEN, State, steady};
 use crate::measurement::Gear;
+use crate::parts::HALF_A_LOST_MOTION_ARCSEC;
 use crate::residual::harmonics;
 use flexspline_base::toml_file::{Allowed, Refused, Section, TomlFile, from, number, one_of, real, whole};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
+use flexspline_design::tables::dead_zone_n_m;
 use flexspline_mechanics::drive::DriveError;
 
 /// The farthest that a drive winds up, rad: torques beyond are in another unit. *Source*: 69 arcmin at the ratcheting
@@ -26,6 +28,8 @@ const FARTHEST_WIND_UP_RAD: f64 = 0.02;
 const STEPS_OF_A_PITCH: u32 = 16;
 /// Places over an output turn that waves of a table are fitted to. *Guess*: dozens for each of its orders.
 const PLACES_OF_A_TURN: u32 = 4000;
+/// Half a backlash that shows nowhere, arcsec. *Guess*: it stands for none where one may be.
+const LEAST_HALF_ARCSEC: f64 = 0.1;
 /// Waves in a turn of the generator that every strain wave gear has, and their first overtone.
 pub(crate) const OF_TWO_LOBES: [f64; 2] = [2.0, 4.0];
 
@@ -195,8 +199,8 @@ impl Nominal {
     }
 
     /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature;
-    /// the backlash is what is left of it as the torque goes to zero. Kinematic error is left to the table's own
-    /// prediction.
+    /// the backlash is what is left of it as the torque goes to zero, or what the direction does without a load, if the
+    /// table has no loads of both signs. Kinematic error is left to the table's own prediction.
     #[must_use]
     pub fn of_table(table: &Table<'_>) -> Nominal {
         let drive = table.drive();
@@ -207,20 +211,33 @@ impl Nominal {
         };
         let [low, high] = table.temperature_range_c();
         let temperature = f32::midpoint(low, high).clamp(low, high);
-        let [from, to] = table.torque_range_n_m();
-        let largest = f64::from(from.abs().min(to.abs()));
-        // Mean of the error over a flexspline pitch, moving forward.
-        let mean = |torque_n_m: f64| -> f64 {
+        let [from, to] = table.torque_range_n_m().map(f64::from);
+        let sign = if to >= -from { 1.0 } else { -1.0 };
+        let (largest, both) = (from.abs().max(to.abs()), (-from).min(to).max(0.0));
+        // Mean of the error over a flexspline pitch.
+        let mean = |torque_n_m: f64, way: f64| -> f64 {
             let step = TAU / f64::from(teeth.flexspline) / f64::from(STEPS_OF_A_PITCH);
-            let at = State { torque_n_m, temperature_c: f64::from(temperature), way: 1.0, ..State::default() };
+            let at = State { torque_n_m, temperature_c: f64::from(temperature), way, ..State::default() };
             let places = (0..STEPS_OF_A_PITCH).map(|k| State { generator_rad: f64::from(k) * step, ..at });
             places.map(|at| steady(table, &at, 0.0)).sum::<f64>() / f64::from(STEPS_OF_A_PITCH) / ARCSEC_PER_RAD
         };
-        let odd = |torque: f64| 0.5 * (mean(torque) - mean(-torque));
-        let at: Vec<f64> = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0].iter().map(|share| share * largest).collect();
+        // Beyond the loads of both signs the error counts from the middle of theirs, or of both ways under the least.
+        let least = 0.0_f64.clamp(from, to);
+        let [forward, backward] = [1.0, -1.0].map(|way| mean(least, way));
+        let middle =
+            if both > 0.0 { 0.5 * (mean(both, 1.0) + mean(-both, 1.0)) } else { f64::midpoint(forward, backward) };
+        let odd = |torque: f64| match torque <= both {
+            true => 0.5 * (mean(torque, 1.0) - mean(-torque, 1.0)),
+            false => sign * (mean(sign * torque, 1.0) - middle),
+        };
+        // Below the jump of its torque axis the direction says which flank carries, and no load does.
+        let beyond = |share: f64| (share * largest).max((1.01 + share) * dead_zone_n_m(table));
+        let at: Vec<f64> = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0].into_iter().map(beyond).collect();
         let angles: Vec<f64> = at.iter().map(|torque| odd(*torque)).collect();
         let slope = |k: usize| ((angles[k + 1] - angles[k]) / (at[k + 1] - at[k])).max(1e-12);
-        let half_backlash_rad = (angles[0] - at[0] * slope(0)).max(0.0);
+        // Without loads of both signs the motion says which flank carries, where nothing loads it.
+        let by_motion = if least == 0.0 { 0.5 * (backward - forward) } else { 0.0 };
+        let half_backlash_rad = if both > 0.0 { angles[0] - at[0] * slope(0) } else { by_motion }.max(0.0);
         let stiffness = (0..at.len() - 1).map(|k| [if k == 0 { 0.0 } else { at[k] }, 1.0 / slope(k)]).collect();
         Nominal {
             ratio: drive.exact_ratio(),
@@ -249,7 +266,11 @@ impl Nominal {
             amplitude_arcsec: line.amplitude,
             phase_rad: line.phase_rad,
         });
-        Nominal { ratio, teeth: None, harmonics: harmonics.collect(), ..nominal }
+        // A spring that is soft under light loads, and play, are much alike to a calibration: what floats is play.
+        let half_arcsec = (0.5 * nominal.backlash_arcsec).max(LEAST_HALF_ARCSEC);
+        let spread = Spread { backlash: HALF_A_LOST_MOTION_ARCSEC / half_arcsec, ..nominal.spread };
+        let (harmonics, backlash_arcsec) = (harmonics.collect(), 2.0 * half_arcsec);
+        Nominal { ratio, teeth: None, harmonics, backlash_arcsec, spread, ..nominal }
     }
 
     /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit,

@@ -283,7 +283,7 @@ pub(crate) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
 }
 
 /// Half of an arc-minute, which the lost motion of the catalogue's drives stays below.
-const HALF_A_LOST_MOTION_ARCSEC: f64 = 30.0;
+pub(crate) const HALF_A_LOST_MOTION_ARCSEC: f64 = 30.0;
 
 /// Sine and cosine of each order, each turned on from the one before.
 fn waves(angle: f64, orders: u16, to: &mut Vec<f64>) {
