@@ -52,7 +52,7 @@ pub use prior::Prior;
 pub use reading::{ByCore, Reading};
 use reading::{DELAY, Delays, OFFSET, delay_note, play_of_a_millisecond};
 pub use rows::one_in;
-use rows::{Recorded, Rows, settled};
+use rows::{Recorded, Rows, settled, torque_by_way};
 use split::SplitWaves;
 pub use split::{EncoderEntry, Split, SplitPart, WaveShare};
 pub(crate) use table::{APART, JUMP_HALF_WIDTH, RIPPLE_NODES};
@@ -708,7 +708,7 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     notes.extend(said);
     notes.extend(delay);
     notes.extend(agreement.and_then(|agreement| agreement.note(files)).into_iter().chain(unlike));
-    notes.extend(remarks(prior, recorded, &model, play_of_a_millisecond_arcsec));
+    notes.extend(remarks(prior, recorded, files, &model, play_of_a_millisecond_arcsec));
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
     let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
@@ -1002,6 +1002,8 @@ fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
     )
 }
 
+/// What a change of the torque winds up, of a lag that undoes it. *Guess*.
+const ALIKE: std::ops::Range<f64> = 0.5..2.0;
 /// Waves that repeat every 360 of an angle's units, within this share of a wave, say that these are degrees. *Guess*:
 /// the order of a line is known far better in some turns.
 const WHOLE_WAVES: f64 = 0.02;
@@ -1032,13 +1034,25 @@ fn in_degrees(files: &[Recording]) -> Option<String> {
 fn remarks(
     prior: &Prior<'_>,
     recorded: &Recorded,
+    files: &[Recording],
     model: &Model,
     play_of_a_millisecond_arcsec: Option<f64>,
 ) -> Vec<String> {
     let said = |there: bool, what: &str| there.then(|| what.to_owned());
     let by_ratio = prior.nominal.teeth.is_none() && prior.table.is_none();
     let teeth = prior.nominal.teeth_or_of_two_waves();
+    let by_way_n_m = torque_by_way(files, prior.nominal.ratio);
+    let wound_arcsec = 0.5 * (model.under_arcsec(by_way_n_m, prior) - model.under_arcsec(-by_way_n_m, prior));
+    let lag_arcsec = model.of(PartName::Play).map_or(0.0, |play| model.coefficients[play.start]);
     let remarks = [
+        (lag_arcsec > 0.0 && ALIKE.contains(&(wound_arcsec / lag_arcsec))).then(|| {
+            format!(
+                "where the motion turns round the torque changes by {:.2} N·m, and the error does not: friction of the \
+                 motor's side is in the column, and in the play of ±{lag_arcsec:.0} arcsec here; the table is for a \
+                 torque that is measured so",
+                2.0 * by_way_n_m
+            )
+        }),
         by_ratio.then(|| {
             format!(
                 "the ratio alone was given: the table is marked with {} and {} teeth, two waves",

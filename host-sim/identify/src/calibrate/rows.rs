@@ -1,14 +1,20 @@
 //! From sessions to rows that a steady model can be fitted to: direction, settled or not, folds.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use super::Model;
 use super::folds::{Folds, Row};
 use super::parts::{self, PartName, Scales, State, flank, width_of};
 use super::prior::Prior;
+use super::zero::OF_95_OF_BLOCKS;
 use crate::least_squares::Normal;
-use crate::measurement::{HELD, Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
+use crate::measurement::{
+    HELD, Recording, Session, TURNED_BACK_RAD, least_and_most, quantile_of, rates, sampled, turns, white_noise,
+};
+use crate::misfit::about_mean;
 use crate::residual::lasting_step;
+use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{PARTS_OF_A_TURN, parts_between};
 
@@ -28,6 +34,10 @@ const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by this multiple of the play.
 const SETTLED: f64 = 1.5;
 
+/// Turns of the motion that tell what the torque does there, at least. *Guess*.
+const FEWEST_TURNS: f64 = 4.0;
+/// Rows to either side of a turn that show it. *Guess*: friction changes over within some, and a load by little.
+const BESIDE_A_TURN: Range<usize> = 2..10;
 /// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it. *Guess*.
 const SURE: f64 = 3.0;
 
@@ -208,6 +218,26 @@ impl Recorded {
             _ => None,
         }
     }
+}
+
+/// Half of what the torque changes by where the motion turns round, N·m; 0 where that is not certain.
+pub(super) fn torque_by_way(files: &[Recording], ratio: f64) -> f64 {
+    let of_session = |session: &Session| -> Vec<f64> {
+        let (angle, torque) = (&session.generator_rad, session.torque_n_m.as_deref().unwrap_or_default());
+        let turns = turns(angle, TURNED_BACK_RAD);
+        let turned = turns.windows(2).enumerate().filter(|(_, w)| w[0].0 * w[1].0 < 0.0);
+        let by_turn = turned.filter_map(|(k, w)| {
+            let at = angle[..=k].iter().rposition(|psi| *psi == w[1].1)?;
+            let before = torque.get(at.checked_sub(BESIDE_A_TURN.end)?..at - BESIDE_A_TURN.start)?;
+            let after = torque.get(at + BESIDE_A_TURN.start + 1..=at + BESIDE_A_TURN.end)?;
+            Some(0.5 * w[1].0 * ratio.signum() * (mean(after) - mean(before)))
+        });
+        by_turn.collect()
+    };
+    let by_turn: Vec<f64> = files.iter().flat_map(|file| &file.sessions).flat_map(of_session).collect();
+    let (by_way, count) = (mean(&by_turn), by_turn.len() as f64);
+    let std = about_mean(&by_turn) / (count - 1.0).max(1.0).sqrt();
+    if count >= FEWEST_TURNS && by_way > OF_95_OF_BLOCKS * std { by_way } else { 0.0 }
 }
 
 /// Speed of the output in each row, rad/s; 0 where no time says it.

@@ -696,3 +696,56 @@ fn a_model_that_is_far_too_soft_makes_a_table() {
     let c = calibrate(&[log], &prior).map_err(|error| error.to_string()).unwrap().calibration;
     assert!(c.core.rms_after_arcsec < 3.0, "{:?}", c.core);
 }
+
+/// Of a spring that hardens and play: under loads of both signs, mostly of one, of one alone, and of play without any.
+#[test]
+fn what_a_table_knows_of_its_spring_and_play_does_not_ask_for_loads_of_both_signs() {
+    let spring = |torque: f64| 170.0 * (torque / 20.0).asinh();
+    for [low, high] in [[-30.0, 30.0], [-6.0, 30.0], [5.0, 30.0], [-30.0, -5.0], [0.0, 0.0]] {
+        let mut log = recording(1, |_, _, _, _| 0.0);
+        let session = &mut log.sessions[0];
+        let (torque, rows) = (session.torque_n_m.as_mut().unwrap(), session.error_rad.len());
+        for (k, (torque, error)) in torque.iter_mut().zip(&mut session.error_rad).enumerate() {
+            *torque = low + (high - low) * (0.5 + *torque / 60.0);
+            let way = if k < rows / 2 { 1.0 } else { -1.0 };
+            let flank = if torque.abs() > 0.5 { torque.signum() } else { -way };
+            *error += (spring(*torque) + 20.0 * flank) / ARCSEC_PER_RAD;
+        }
+        let mut recorded = log.clone();
+        recorded.sessions[0].torque_n_m = recorded.sessions[0].torque_n_m.take().filter(|_| low < high);
+        let made = calibrate(&[recorded], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+        let known = crate::nominal::Nominal::of_table_by_ratio(&Table::check(&made.table.image).unwrap(), RATIO);
+        let winds_up = |from: f64, to: f64| known.wind_up_arcsec(to) - known.wind_up_arcsec(from);
+        let ends = [[low.abs().min(high.abs()), low.abs().max(high.abs())], [10.0, 25.0]];
+        for [from, to] in ends.into_iter().filter(|[from, to]| low < high && low * high != 0.0 && from < to) {
+            let [found, due] = [winds_up(from, to), spring(to) - spring(from)];
+            assert!((found / due - 1.0).abs() < 0.06, "{low} to {high}: {found} from {from} to {to}, {due} is due");
+        }
+        if low == high {
+            assert!((known.backlash_arcsec - 40.0).abs() < 2.0, "{}", known.backlash_arcsec);
+        }
+    }
+}
+
+#[test]
+fn friction_of_the_motors_side_in_the_torque_is_told_from_play() {
+    for friction_n_m in [0.0, 4.0] {
+        let mut log = recording(1, |_, _, _, _| 0.0);
+        let session = &mut log.sessions[0];
+        let rows = session.len();
+        session.generator_rad = (0..rows).map(|k| 60.0 * (k as f64 / 130.0).sin()).collect();
+        let torque = session.torque_n_m.as_mut().unwrap();
+        for (k, (torque, error)) in torque.iter_mut().zip(&mut session.error_rad).enumerate() {
+            let way = (k as f64 / 130.0).cos().signum();
+            let play = if friction_n_m > 0.0 { 0.0 } else { -32.0 * way };
+            *error += (8.0 * *torque + play) / ARCSEC_PER_RAD;
+            *torque += friction_n_m * way;
+        }
+        let made = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap().calibration;
+        assert!(kept(&made).contains(&"play"), "{:#?}", made.parts);
+        let told: Vec<&String> =
+            made.notes.iter().filter(|note| note.contains("friction of the motor's side")).collect();
+        assert_eq!(told.len(), usize::from(friction_n_m > 0.0), "{:?}", made.notes);
+        assert!(told.iter().all(|note| note.contains("by 8.") || note.contains("by 7.9")), "{told:?}");
+    }
+}

@@ -155,7 +155,7 @@ impl Session {
 
 /// The generator must turn back by this angle, rad, before the flank is taken to have changed: its noise does not.
 /// *Guess*: 1.1°, of which an output behind a ratio of 100 sees 41 arcsec.
-const TURNED_BACK_RAD: f64 = 0.02;
+pub(crate) const TURNED_BACK_RAD: f64 = 0.02;
 
 /// Which way an angle last moved by more than `back`, 0 before it first did, and where it turned that way; row by row.
 pub(crate) fn turns(angle: &[f64], back: f64) -> Vec<(f64, f64)> {
