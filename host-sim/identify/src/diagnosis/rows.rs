@@ -4,9 +4,10 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use crate::least_squares::dot;
 pub(crate) use crate::least_squares::{add_scaled, combined};
 pub(crate) use crate::measurement::rms;
-use crate::measurement::{Session, cubic_at_zero, neighbours, quantile_of, rates};
+use crate::measurement::{Session, cubic_at_zero, neighbours, quantile_of, rates, white_noise};
 use crate::nominal::Nominal;
 use flexspline::FixedMember;
 pub(super) use flexspline_base::statistics::mean;
@@ -15,6 +16,18 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 /// Four rows around one give its angle as long as they span no more than this multiple of what the inner two do.
 /// *Guess*: even rows give 2, and one lost row 2.5 at most.
 const FAR_APART: f64 = 4.0;
+
+/// Rows to either side of one that its mean is taken over. *Guess*: octaves.
+const WINDOWS: [usize; 7] = [0, 1, 2, 4, 8, 16, 32];
+/// Rows by which the error may follow the load late, or before it. *Guess*: a slow loop reads so far apart.
+const ROWS_OFF: usize = 16;
+/// Share of the wind-up of what changes from row to row that the error follows where it is load. *Guess*.
+const FOLLOWED: f64 = 0.1;
+/// What noise of the torque winds up matters from this share of the noise of the error on. *Guess*: with a third a row
+/// scatters by a twentieth more.
+const MATTERS: f64 = 0.3;
+/// A mean is known to this many of its standard deviations. *Guess*: the method asks for two to three.
+const KNOWN_TO: f64 = 2.0;
 
 /// Which columns were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,8 +133,29 @@ impl Rows {
         if rows.jitters {
             rows.generator = rows.by_neighbours();
         }
+        rows.torque = rows.load(nominal);
         rows.derive(nominal);
         rows
+    }
+
+    /// The load without the noise of its sensor, where what changes from row to row is noise: the error follows none of
+    /// it, at once or some rows off. The drive winds up by the load alone, and noise would pass for a softer spring, or
+    /// for a load that comes late (errors in variables; Fuller, Measurement Error Models, 1987, 1.1).
+    fn load(&self, nominal: &Nominal) -> Vec<f64> {
+        let of_session = |session: &Range<usize>| {
+            let torque = &self.torque[session.clone()];
+            let wound: Vec<f64> = torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
+            let columns = [&self.error[session.clone()], &wound];
+            let [of_error, of_torque] = columns.map(|column| white_noise([column]));
+            let [error, wound] = columns.map(bends);
+            let inner = wound.get(ROWS_OFF..wound.len().saturating_sub(ROWS_OFF)).unwrap_or_default();
+            let follows = |off: usize| dot(inner, &error[off..][..inner.len()]).abs() > FOLLOWED * dot(inner, inner);
+            // Sessions that nobody has measured have no error, and no noise.
+            let matters = of_torque > MATTERS * of_error && dot(&error, &error) > 0.0;
+            let is_noise = !inner.is_empty() && matters && !(0..=2 * ROWS_OFF).any(follows);
+            if is_noise { without_noise(torque) } else { torque.to_vec() }
+        };
+        self.sessions.iter().flat_map(of_session).collect()
     }
 
     /// The generator angle of each row as those beside it have it: a cubic in time through the two before and the two
@@ -276,6 +310,33 @@ impl Rows {
     pub(crate) fn load_scale(&self) -> f64 {
         quantile(self.torque.iter().map(|t| t.abs()), 0.98)
     }
+}
+
+/// Second differences.
+fn bends(values: &[f64]) -> Vec<f64> {
+    values.windows(3).map(|v| v[0] - 2.0 * v[1] + v[2]).collect()
+}
+
+/// Values of which each is the mean over the widest window in which no narrower one says otherwise under their white
+/// noise (intersection of confidence intervals; Goldenshluger and Nemirovski, Math. Methods Stat. 6, 135, 1997). A step
+/// stays one.
+fn without_noise(values: &[f64]) -> Vec<f64> {
+    let (noise, mut quiet, mut sums) = (white_noise([values]), values.to_vec(), vec![0.0]);
+    values.iter().for_each(|value| sums.push(sums[sums.len() - 1] + value));
+    for (k, quiet) in quiet.iter_mut().enumerate() {
+        let [mut low, mut high] = [f64::NEG_INFINITY, f64::INFINITY];
+        for half in WINDOWS.into_iter().take_while(|half| *half <= k.min(values.len() - 1 - k)) {
+            let count = (2 * half + 1) as f64;
+            let mean = (sums[k + half + 1] - sums[k - half]) / count;
+            let known = KNOWN_TO * noise / count.sqrt();
+            (low, high) = (low.max(mean - known), high.min(mean + known));
+            if low > high {
+                break;
+            }
+            *quiet = mean;
+        }
+    }
+    quiet
 }
 
 /// Highest order per turn of which a share of the steps (rad, which are reordered) sees each wave twice or more; no

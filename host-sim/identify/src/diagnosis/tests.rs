@@ -199,6 +199,24 @@ fn a_ring_held_in_three_jaws_hides_no_other_line_of_the_output() {
     }
 }
 
+/// The drive winds up by the load, and not by what its sensor adds to that.
+#[test]
+fn noise_of_the_torque_is_no_softer_spring_and_no_load_that_comes_late() {
+    let mut random = fastrand::Rng::with_seed(75);
+    let sound = recorded(&[], 5, 3000, 100.0, 1.0, 74);
+    let mut noisy = sound.clone();
+    for torque in noisy.iter_mut().flat_map(|session| session.torque_n_m.as_mut().unwrap()) {
+        *torque += 0.4 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+    }
+    let [of_sound, of_noisy] = [sound, noisy].map(|sessions| {
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
+        assert_eq!(names(&diagnosis), [], "{}", diagnosis.text());
+        (diagnosis.recalibrated["stiffness"].value, diagnosis.residual.rms_after_arcsec)
+    });
+    assert!((of_noisy.0 - of_sound.0).abs() < 0.02, "stiffness: {of_noisy:?}, {of_sound:?} without noise");
+    assert!(of_noisy.1 < 2.0 * of_sound.1, "left: {of_noisy:?}, {of_sound:?} without noise");
+}
+
 #[test]
 fn a_load_that_swings_with_much_damping_is_a_resonance() {
     let diagnosis = diagnosed(&["torsional_resonance:frequency_hz=9,damping_ratio=0.15"], 13);

@@ -148,23 +148,6 @@ fn by_noise(fit: &Fit, covariance: &[f64]) -> Vec<f64> {
     of_noise
 }
 
-/// By how much each coefficient is off to first order, as the torque that winds the drive up has noise of its own: its
-/// stiffness comes out too soft, and what goes with the load takes its place (errors in variables; Fuller, Measurement
-/// Error Models, 1987, section 1.1). By no more than it has come out so: what looks like noise may be load.
-fn by_noise_of_the_load(problem: &Problem<'_>, fit: &Fit, covariance: &[f64]) -> Vec<f64> {
-    let (n, rows, fineness) = (fit.priors.len(), problem.on.rows, problem.fineness);
-    let Some(stiffness) = problem.on.base.floating.iter().position(|floating| floating.name == "stiffness") else {
-        return vec![0.0; n];
-    };
-    let noise_n_m = robust::white_noise(rows.sessions.iter().map(|session| &rows.torque[session.clone()]));
-    let moved = |k: usize| noise_n_m * problem.on.nominal.slope_arcsec(rows.torque[k]);
-    let squares: f64 = rows.sessions_used().flatten().map(|k| (moved(k) / fineness.noise.white).powi(2)).sum();
-    let information = fineness.worth * squares / fineness.stride as f64;
-    let (coefficient, with) = (fit.solution.coefficients[stiffness], &covariance[stiffness * n..][..n]);
-    let off = (information * (1.0 + coefficient) * with[stiffness]).min(-coefficient).max(0.0);
-    with.iter().map(|with_stiffness| off * with_stiffness / with[stiffness]).collect()
-}
-
 /// How well each term is known, where `beyond` times the noise is left.
 #[must_use]
 pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec<Known> {
@@ -179,10 +162,8 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
             Some((moved, solved.covariance()))
         })
         .collect();
-    let mut covariance = fit.solution.covariance();
+    let covariance = fit.solution.covariance();
     let of_noise = by_noise(&fit, &covariance);
-    let off = outer(&by_noise_of_the_load(problem, &fit, &covariance));
-    covariance.iter_mut().zip(off).for_each(|(sum, off)| *sum += off);
     let by_stretches = stretched(problem, &fit, &problem.white_columns(&terms, Some(&moves)));
     let mut place = n - moves.len();
     let mut all = Vec::new();
