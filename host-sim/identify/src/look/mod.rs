@@ -218,8 +218,7 @@ impl Guess {
     fn mapped(&self, place: usize) -> Option<MappedColumn> {
         let quantity = self.column.role.row().filter(|_| self.column.used)?;
         let reading = Reading::parse(&self.written()?, quantity.family(), None).ok()?;
-        let name = self.name.clone();
-        Some(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said: false })
+        Some(MappedColumn { quantity, name: self.name.clone(), place, reading, said: false })
     }
 
     /// The unit as a mapping takes it.

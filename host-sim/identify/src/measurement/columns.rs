@@ -98,8 +98,6 @@ pub(crate) struct MappedColumn {
     pub name: String,
     /// Where it stands, from 0.
     pub place: usize,
-    /// Its unit; counts that are divided are turns.
-    pub unit: Unit,
     /// How its numbers are read.
     pub reading: Reading,
     /// Whether the mapping says so: then it is believed.
@@ -111,7 +109,7 @@ impl ColumnMap {
     /// `generator=#1:count/16777216,torque=#4:-N.m`. Without `:unit` a name that ends in a unit says it (`_rad`,
     /// `_deg`, `_turns`, …), else a line of units below the names, else it is that of the default column.
     pub fn parse(text: &str) -> Result<ColumnMap, MappingError> {
-        ColumnMap::with_torque_constant(text, None)
+        ColumnMap::of_options(text, None, None)
     }
 
     /// The mapping of options: of the columns, empty for the names of this project; the rate of rows, Hz, for files
@@ -128,14 +126,8 @@ impl ColumnMap {
         if let Some(rate) = rate_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             return Err(MappingError(format!("--rate: found {rate}, allowed: a rate above zero, Hz")));
         }
-        let given =
-            if columns.is_empty() { Vec::new() } else { ColumnMap::with_torque_constant(columns, per_ampere)?.given };
-        Ok(ColumnMap { given, rate_hz })
-    }
-
-    fn with_torque_constant(text: &str, per_ampere: Option<f64>) -> Result<ColumnMap, MappingError> {
-        let mut map = ColumnMap::default();
-        for entry in text.split(',').map(str::trim) {
+        let mut map = ColumnMap { rate_hz, ..ColumnMap::default() };
+        for entry in columns.split(',').filter(|_| !columns.is_empty()).map(str::trim) {
             let given = given(entry, per_ampere)?;
             let (name, column) = (given.quantity, &given.column);
             match map.given.iter().find(|other| other.quantity == name || other.column == *column) {
@@ -210,7 +202,7 @@ impl ColumnMap {
             let reading = reading.map_err(|wrong| problem(format!("column {name}: {wrong}")))?;
             let reading = reading.unwrap_or(Reading::of(default.1));
             let (name, said) = (name.to_owned(), said.is_some());
-            columns.push(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said });
+            columns.push(MappedColumn { quantity, name, place, reading, said });
         }
         let has = |quantity| columns.iter().any(|column| column.quantity == quantity);
         if !has(Quantity::Generator) {
@@ -343,16 +335,17 @@ mod tests {
     fn a_mapping_names_columns_and_units() {
         let map = ColumnMap::parse("generator=wave_gen_turns:turn, error=error_arcsec,time=t_s").unwrap();
         let columns = map.resolve(&laid_out("t_s,wave_gen_turns,error_arcsec,output_rad")).unwrap();
-        let said: Vec<_> = columns.iter().map(|c| (c.quantity.name(), c.place, c.unit.name())).collect();
+        let said: Vec<_> =
+            columns.iter().map(|c| (c.quantity.name(), c.place, c.reading.plain_unit().name())).collect();
         assert_eq!(said, [("time", 0, "s"), ("generator", 1, "turn"), ("error", 2, "arcsec")]);
         // A name may hold a colon if the unit is said, and a unit in the name is believed.
         let map = ColumnMap::parse("generator=enc:1:deg,output=load_deg").unwrap();
         let columns = map.resolve(&laid_out("enc:1,load_deg")).unwrap();
-        assert_eq!((columns[0].unit, columns[1].unit), (Unit::Degree, Unit::Degree));
+        assert_eq!((columns[0].reading.plain_unit(), columns[1].reading.plain_unit()), (Unit::Degree, Unit::Degree));
         // A place in a list is no unit.
         let map = ColumnMap::parse("generator=position[1],output=out [gon]").unwrap();
         let columns = map.resolve(&laid_out("position[1],out [gon]")).unwrap();
-        assert_eq!((columns[0].unit, columns[1].unit), (Unit::Radian, Unit::Gon));
+        assert_eq!((columns[0].reading.plain_unit(), columns[1].reading.plain_unit()), (Unit::Radian, Unit::Gon));
     }
 
     #[test]
@@ -365,7 +358,8 @@ mod tests {
     fn columns_go_by_number_where_no_name_is_meant() {
         let map = ColumnMap::parse("generator=#2:count/4096,output=3:-deg,torque=1").unwrap();
         let columns = map.resolve(&laid_out("1,b,c")).unwrap();
-        let said: Vec<_> = columns.iter().map(|c| (c.quantity.name(), c.place, c.unit.name())).collect();
+        let said: Vec<_> =
+            columns.iter().map(|c| (c.quantity.name(), c.place, c.reading.plain_unit().name())).collect();
         assert_eq!(said, [("generator", 1, "turn"), ("output", 2, "deg"), ("torque", 0, "N.m")]);
         assert_eq!(columns[0].reading.value(1024.0), std::f64::consts::TAU / 4.0);
         assert_eq!(columns[1].reading.value(180.0), -std::f64::consts::PI);
@@ -376,7 +370,6 @@ mod tests {
     #[test]
     fn wrong_mappings_are_refused_each_with_its_own_message() {
         for (text, said) in [
-            ("", "found \"\""),
             ("generator", "found \"generator\""),
             ("generator=", "generator: found no column"),
             ("angle=a:rad", "found the name \"angle\""),

@@ -248,7 +248,7 @@ pub(super) fn unwrap(log: &mut Log, columns: &[MappedColumn], ratio: f64, notes:
 /// The span after which a counter begins anew, rad, and a sentence on it; none for a single turn, which the other angle
 /// helps.
 fn counter(values: &[f64], column: &MappedColumn, other: Option<&[f64]>) -> Option<(f64, String)> {
-    let count_rad = (column.reading.gain * column.unit.factor()).abs();
+    let count_rad = (column.reading.gain * column.reading.unit.factor()).abs();
     let counts: Vec<f64> =
         Some(values).filter(|_| column.reading.unit == Unit::Count)?.iter().map(|value| value / count_rad).collect();
     let anew = begins_anew(&counts, &registers().collect::<Vec<_>>(), true, other).filter(|anew| !anew.ambiguous)?;

@@ -413,7 +413,7 @@ mod tests {
     fn milliseconds_read_as_seconds_are_refused_where_a_motor_turns_round_slowly_and_nobody_says_seconds() {
         let time = |said: bool| {
             let (quantity, name, unit) = (Quantity::Time, "t".to_owned(), Unit::Second);
-            [MappedColumn { quantity, name, place: 0, unit, reading: Reading::of(unit), said }]
+            [MappedColumn { quantity, name, place: 0, reading: Reading::of(unit), said }]
         };
         let mut fast = log(9000, |row| Some(2.0 * row as f64));
         let refused = check(&mut fast, &time(false), &mut Findings::default()).unwrap_err().to_string();

@@ -59,7 +59,7 @@ fn mismatch(log: &Log, channel: Option<Quantity>, treatment: Treatment, what: St
 /// The name of a column and the unit given.
 fn column(columns: &[MappedColumn], quantity: Quantity) -> (&str, Unit) {
     let column = columns.iter().find(|column| column.quantity == quantity);
-    column.map_or((quantity.name(), quantity.default_column().1), |column| (&column.name, column.unit))
+    column.map_or((quantity.name(), quantity.default_column().1), |column| (&column.name, column.reading.plain_unit()))
 }
 
 /// Units without a gain in which the values of a column lie within `allowed`, as `value` does in the unit given; and
