@@ -122,8 +122,6 @@ pub struct Looked {
     pub header_line: Option<u64>,
     /// The columns.
     pub columns: Vec<LookedColumn>,
-    /// Other columns that may be generator and output as well, the likeliest first.
-    pub rivals: Vec<Rival>,
     /// Turns of the generator for one of the output as the rows have it, signed.
     pub ratio_found: Option<f64>,
     /// The whole number next to it.
@@ -140,21 +138,6 @@ pub struct Looked {
     pub columns_option: Option<String>,
     /// Questions to whoever knows the bench.
     pub notes: Vec<String>,
-}
-
-/// Generator and output as they may be, too.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Rival {
-    /// The column of the generator.
-    pub generator: String,
-    /// The column of the output.
-    pub output: String,
-    /// Turns of the generator for one of the output, signed; `None` where a unit is open.
-    pub ratio: Option<f64>,
-    /// The value for `--columns` if these are meant; `None` where a unit is open.
-    pub columns_option: Option<String>,
-    /// Why the pair proposed goes before it.
-    pub why: String,
 }
 
 /// A column at work.
@@ -263,7 +246,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, MeasuredError> {
     let mut guesses: Vec<Guess> = (0..layout.names.len()).map(|place| guess(files, place, &rows)).collect();
     time(&mut guesses, first.columns.lines.len());
     units_of_counts(&mut guesses);
-    let (ratio, rivals) = pair(&mut guesses, &mut notes);
+    let ratio = pair(&mut guesses, &mut notes);
     notes.extend(apart(&guesses).filter(|_| ratio.is_none()));
     settle(&mut guesses);
     let proposed = ratio.map(proposed_ratio);
@@ -299,7 +282,6 @@ pub fn look(files: &[RawFile]) -> Result<Looked, MeasuredError> {
         separator: layout.separator.name(),
         decimal_comma: layout.decimal_comma,
         header_line: layout.has_names.then_some(layout.header_line),
-        rivals,
         ratio_found: ratio,
         ratio_proposed: proposed,
         sessions: read.iter().map(|rows| rows.log.sessions().count().max(1)).sum(),

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use super::relation::{TOGETHER, slope};
 use super::turns::{AngleUnit, on_one_shaft, settle, units_of_pair};
-use super::{Guess, Rival, Role};
+use super::{Guess, Role};
 use crate::measurement::{Family, Unit, least_and_most};
 
 /// Rows in which a column is followed, at most.
@@ -17,7 +17,7 @@ const FOLLOWED: usize = 4000;
 const ABOUT_ZERO: f64 = 0.1;
 /// And if it goes through its range more often than this. *Guess*: a bench goes to and fro a few times.
 const OFTEN: f64 = 4.0;
-/// Rivals that are written out in notes; all are in `rivals`.
+/// Rivals that are written out in notes.
 const SAID: usize = 3;
 
 /// Two columns that may be generator and output.
@@ -48,14 +48,6 @@ impl Pair {
         let differs = self.reasons.iter().zip(&other.reasons).position(|(a, b)| a != b);
         WHY[differs.unwrap_or(WHY.len() - 1)]
     }
-
-    /// It as a rival of the pair proposed.
-    fn rival(&self, proposed: &Pair, guesses: &[Guess]) -> Rival {
-        let [generator, output] = [self.generator, self.output].map(|k| guesses[k].name.clone());
-        let [g, o] = self.units.map(|unit| unit.written());
-        let columns_option = g.zip(o).map(|(g, o)| format!("generator={generator}:{g},output={output}:{o}"));
-        Rival { generator, output, ratio: self.ratio, columns_option, why: proposed.before(self).to_owned() }
-    }
 }
 
 /// The ratio of a pair in words, if it is known.
@@ -63,23 +55,24 @@ fn to_one(ratio: Option<f64>, decimals: usize) -> String {
     ratio.map_or(String::new(), |ratio| format!(", {ratio:.decimals$} to 1"))
 }
 
-/// The ratio between generator and output, with the role and unit of each settled, and what they may be, too.
-pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f64>, Vec<Rival>) {
+/// The ratio between generator and output, with the role and unit of each settled; notes say what they may be, too.
+pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> Option<f64> {
     let mut pairs = pairs(guesses);
     pairs.sort_by(|a, b| b.reasons.partial_cmp(&a.reasons).unwrap_or(std::cmp::Ordering::Equal));
-    let Some((best, others)) = pairs.split_first() else { return (None, Vec::new()) };
+    let (best, others) = pairs.split_first()?;
     let Pair { generator: g, output: o, units, ratio, .. } = *best;
     // What shows the same two shafts once more is no rival.
     let same = |a: usize, b: usize| a == b || on_one_shaft(&guesses[a], &guesses[b]).is_some();
     let level = others.iter().filter(|other| other.reasons[..2] == best.reasons[..2]);
-    let level = level.filter(|other| !(same(other.generator, g) && same(other.output, o)));
-    let rivals: Vec<Rival> = level.map(|other| other.rival(best, guesses)).collect();
+    let rivals: Vec<&Pair> = level.filter(|other| !(same(other.generator, g) && same(other.output, o))).collect();
+    let names = |pair: &Pair| [pair.generator, pair.output].map(|k| guesses[k].name.clone());
+    let names: Vec<[String; 2]> = rivals.iter().map(|rival| names(rival)).collect();
     for (k, role, other, unit) in [(g, Role::Generator, o, units[0]), (o, Role::Output, g, units[1])] {
         let guess = &mut guesses[k];
         if guess.column.role == Role::Command {
             notes.push(format!("column {} is a command, which stands for the angle of the generator", k + 1));
         }
-        let sure = match rivals.first() {
+        let sure = match names.first() {
             Some(_) => 0.5,
             None if guess.column.role == role && unit.written().is_some() => 0.9,
             None => 0.6,
@@ -87,13 +80,16 @@ pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f6
         (guess.column.role, guess.column.used) = (role, true);
         settle(guess, k, &unit, notes);
         guess.because(format!("turns with column {}{}", other + 1, to_one(ratio, 3)), sure);
-        if let Some(first) = rivals.first() {
-            guess.column.why.push(format!("{} and {} may be meant as well", first.generator, first.output));
+        if let Some([generator, output]) = names.first() {
+            guess.column.why.push(format!("{generator} and {output} may be meant as well"));
         }
     }
-    for Rival { generator, output, ratio, columns_option, why } in rivals.iter().take(SAID) {
-        let pass_on = columns_option.as_ref().map_or(String::new(), |columns| format!(", --columns {columns}"));
-        let to_one = to_one(*ratio, 2);
+    for (rival, [generator, output]) in rivals.into_iter().zip(names).take(SAID) {
+        let (to_one, why) = (to_one(rival.ratio, 2), best.before(rival));
+        let pass_on = match rival.units.map(|unit| unit.written()) {
+            [Some(g), Some(o)] => format!(", --columns generator={generator}:{g},output={output}:{o}"),
+            _ => String::new(),
+        };
         notes.push(format!(
             "columns {generator} and {output} may be generator and output as well{to_one}{pass_on}; columns {} and {} \
              are proposed because {why}",
@@ -101,7 +97,7 @@ pub(super) fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> (Option<f6
             o + 1
         ));
     }
-    (ratio, rivals)
+    ratio
 }
 
 /// The numbers of the joints whose generator and output are used.
