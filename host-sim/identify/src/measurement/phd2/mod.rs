@@ -32,8 +32,6 @@ const SIDEREAL_DAY_S: f64 = 86_164.090_5;
 /// Beyond this declination a distance in the sky says too little of the axis, deg. *Guess*: there an axis moves a star
 /// by a sixth of its own way.
 const HIGHEST_DECLINATION_DEG: f64 = 80.0;
-/// Columns of a row, by the names of its header.
-const COLUMNS: [&str; 6] = ["Time", "mount", "RARawDistance", "RADuration", "RADirection", "ErrorCode"];
 /// Whether a file that begins so is a guide log.
 pub(super) fn is_one(head: &[u8]) -> bool {
     let first = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
@@ -53,8 +51,8 @@ struct GuideSection {
     /// Pixels in the sky for a second of a pulse, and arc-seconds of the axis.
     x_rate: Option<f64>,
     guide_speed: Option<f64>,
-    /// Where [`COLUMNS`] stand in its table.
-    table: Option<Header<{ COLUMNS.len() }>>,
+    /// The header of its table.
+    table: Option<Header>,
     /// Angle by which pulses have set the axis forward, arcsec.
     sent_arcsec: f64,
     frames: Vec<Frame>,
@@ -100,7 +98,8 @@ impl GuideSection {
             return Ok(());
         }
         let problem = |what: String| TableProblem { line: number_of_line, what };
-        let fields = header.fields(line).ok_or_else(|| {
+        let columns = ["Time", "mount", "RARawDistance", "RADuration", "RADirection", "ErrorCode"];
+        let fields = header.fields(line, columns).ok_or_else(|| {
             problem("more fields than names; allowed: decimals behind a point, or behind a comma in quotes".to_owned())
         })?;
         let [time_s, mount, distance, duration, direction, error] = &fields;
@@ -170,7 +169,7 @@ pub(super) fn read(bytes: &[u8], ratio: f64) -> Result<(Log, Vec<String>), Table
             // The star is held elsewhere.
             session += 1;
             section.sent_arcsec = 0.0;
-        } else if let Some(header) = Header::of(line, COLUMNS) {
+        } else if let Some(header) = Header::of(line) {
             section.table = Some(header);
         } else if section.table.is_none() {
             section.learn(line);

@@ -51,31 +51,29 @@ pub(super) fn number(text: &str) -> Option<f64> {
     parsed.ok().filter(|value| value.is_finite())
 }
 
-/// The columns of a table of rows.
+/// The names of the columns of a table of rows.
 #[derive(Clone, Debug)]
-pub(super) struct Header<const N: usize> {
+pub(super) struct Header {
     separator: char,
-    width: usize,
-    places: [Option<usize>; N],
+    names: Vec<String>,
 }
 
-impl<const N: usize> Header<N> {
-    /// Of a line that begins with the column `Frame`; `names` are the columns in use.
-    pub fn of(line: &str, names: [&str; N]) -> Option<Header<N>> {
+impl Header {
+    /// Of a line that begins with the column `Frame`.
+    pub fn of(line: &str) -> Option<Header> {
         let rest = line.trim_start_matches('"').strip_prefix("Frame")?.trim_start_matches('"');
         let separator = rest.chars().next().filter(|c| SEPARATORS.contains(c))?;
-        let all = split(line, separator);
-        let places = names.map(|name| all.iter().position(|known| known == name));
-        Some(Header { separator, width: all.len(), places })
+        Some(Header { separator, names: split(line, separator) })
     }
 
-    /// The fields of the columns in use, empty where there is none; `None` where there are more than the names allow,
-    /// as numbers with decimal commas between commas make them.
-    pub fn fields(&self, line: &str) -> Option<[String; N]> {
+    /// The fields of columns by their names, empty where there is none; `None` where there are more than the names
+    /// allow, as numbers with decimal commas between commas make them.
+    pub fn fields<const N: usize>(&self, line: &str, columns: [&str; N]) -> Option<[String; N]> {
         let fields = split(line, self.separator);
+        let place = |column: &str| self.names.iter().position(|name| name == column);
+        let field = |column| place(column).and_then(|place| fields.get(place).cloned()).unwrap_or_default();
         // One more than names says why a star was lost.
-        let field = |place: Option<usize>| place.and_then(|place| fields.get(place).cloned()).unwrap_or_default();
-        (fields.len() <= self.width + 1).then(|| self.places.map(field))
+        (fields.len() <= self.names.len() + 1).then(|| columns.map(field))
     }
 }
 
@@ -119,17 +117,17 @@ mod tests {
         let names = "Frame,Time,mount,dx,RARawDistance,RADuration,RADirection,StarMass,SNR,ErrorCode";
         let used = ["Time", "RARawDistance", "RADuration", "RADirection", "ErrorCode", "Absent"];
         let plain = ["2.093", "0.15", "108", "W", "0", ""];
-        let header = Header::of(names, used).unwrap();
-        let fields = |line: &str| header.fields(line);
+        let header = Header::of(names).unwrap();
+        let fields = |line: &str| header.fields(line, used);
         assert_eq!(fields("7,2.093,\"Mount\",-0.5,0.15,108,W,1702,28.36,0").unwrap(), plain);
         assert_eq!(fields("7,2,093,\"Mount\",-0,5,0,15,108,W,1702,28,36,0"), None);
         let quoted = fields("7,\"2,093\",Mount,\"-0,5\",\"0,15\",108,W,1702,\"28,36\",0").unwrap();
         assert_eq!(number(&quoted[0]), Some(2.093));
         let lost = fields("8,3.1,\"DROP\",,,,,0,0.00,3,\"Star lost, low mass\"").unwrap();
         assert_eq!(lost[4], "3");
-        let header = Header::of(&names.replace(',', ";"), used).unwrap();
-        let semicolons = header.fields("7;2,093;Mount;-0,5;0,15;108;W;1702;28,36;0").unwrap();
+        let header = Header::of(&names.replace(',', ";")).unwrap();
+        let semicolons = header.fields("7;2,093;Mount;-0,5;0,15;108;W;1702;28,36;0", used).unwrap();
         assert_eq!(number(&semicolons[1]), Some(0.15));
-        assert!(Header::of("Frames lost", used).is_none());
+        assert!(Header::of("Frames lost").is_none());
     }
 }
