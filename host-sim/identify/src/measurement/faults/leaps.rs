@@ -24,7 +24,7 @@ const TOGETHER_RAD: f64 = 0.02;
 /// … and this share of the larger. *Guess*: a column that is frozen moves by nothing.
 const TOGETHER: f64 = 0.3;
 /// Rows before and after, for what is usual there. *Guess*: few, so that the pace is the same.
-const AROUND: usize = 3;
+pub(super) const AROUND: usize = 3;
 /// Rows at the end of a session and at the beginning of the next whose medians are compared. *Guess*: a median of eight
 /// is not moved by two bad rows.
 const LEVEL_ROWS: usize = 8;
@@ -38,15 +38,14 @@ const NEAR_PITCHES: f64 = 0.05;
 const SLOPE: f64 = 1e-3;
 
 /// Change of a column into a row.
-fn moved(values: &[f64], row: usize) -> f64 {
+pub(super) fn moved(values: &[f64], row: usize) -> f64 {
     values[row] - values[row - 1]
 }
 
-/// Median move of a column in the rows around one, which is left out.
-fn usual(log: &Log, values: &[f64], row: usize) -> f64 {
+/// Moves of a column in the rows around one, which is left out.
+pub(super) fn moves_around(log: &Log, values: &[f64], row: usize) -> Vec<f64> {
     let near = row.saturating_sub(AROUND).max(1)..(row + AROUND + 1).min(values.len());
-    let mut moves: Vec<f64> = near.filter(|k| *k != row && log.continues(*k)).map(|k| moved(values, k)).collect();
-    median_of(&mut moves)
+    near.filter(|k| *k != row && log.continues(*k)).map(|k| moved(values, k)).collect()
 }
 
 /// Finds rows into which the generator's angle leaps by whole turns, and takes these out.
@@ -54,8 +53,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else { return };
     let of_row = |row: usize| {
         let turns = whole_turns(moved(generator, row) - moved(output, row) * gear.ratio)?;
-        let by_generator = (moved(generator, row) - usual(log, generator, row)).abs();
-        let by_output = ((moved(output, row) - usual(log, output, row)) * gear.ratio).abs();
+        let beyond_usual = |values: &[f64]| (moved(values, row) - median_of(&mut moves_around(log, values, row))).abs();
+        let (by_generator, by_output) = (beyond_usual(generator), beyond_usual(output) * gear.ratio.abs());
         // A generator that was frozen leaps to where it is: before a leap both go on together.
         let before = |values: &[f64]| {
             let rows = row.saturating_sub(AROUND).max(1)..row;

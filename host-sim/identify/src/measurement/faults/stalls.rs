@@ -1,6 +1,7 @@
 //! A logger that stands still now and then while its time counts on: the angles leap over several rows' worth of
 //! motion, both of them, and the column of time does not show it.
 
+use super::leaps::{AROUND, moved, moves_around};
 use super::{Findings, add_steps, clock, rhythm};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
@@ -8,9 +9,7 @@ use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_of, sampled};
 
-/// Rows before and after that must agree on the pace. *Guess*: few, so that the pace is the same.
-const AROUND: usize = 3;
-/// They agree within this share. *Guess*: a leap by a row more is four times that.
+/// The rows around agree on the pace within this share. *Guess*: a leap by a row more is four times that.
 const STEADY: f64 = 0.25;
 /// A leap exceeds what time gives by the motion of this many rows, at least… *Guess*: one, less what the pace may
 /// change by.
@@ -75,27 +74,17 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
     let third = generator.windows(4).map(|v| (v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]).abs()).collect::<Vec<f64>>();
     let least = OVER_NOISE * median_of(&mut sampled(&third));
     let (mut found, mut tested) = (Vec::new(), 0);
-    for row in AROUND + 1..log.len().saturating_sub(AROUND) {
-        let near = row - AROUND..=row + AROUND;
-        if !near.clone().all(|k| log.continues(k)) {
-            continue;
-        }
-        // Motion of the generator for each second of the clock, the row itself aside.
-        let pace =
-            |values: &[f64], k: usize| (values[k] - values[k - 1]) / (time[k] - time[k - 1]).max(1e-9 * period_s);
-        let middle = |values: &[f64]| {
-            let mut paces: Vec<f64> = near.clone().filter(|k| *k != row).map(|k| pace(values, k)).collect();
-            let even = least_and_most(paces.iter().copied());
-            (median_of(&mut paces), even.1 - even.0)
-        };
-        let (usual, spread) = middle(generator);
-        if usual.abs() * period_s < least || spread > STEADY * usual.abs() {
+    for row in log.continued() {
+        let mut moves = moves_around(log, generator, row);
+        let (low, high) = least_and_most(moves.iter().copied());
+        let usual = median_of(&mut moves);
+        if moves.len() < 2 * AROUND || usual.abs() < least || high - low > STEADY * usual.abs() {
             continue;
         }
         tested += 1;
-        let dt = time[row] - time[row - 1];
-        let extra_s = (generator[row] - generator[row - 1]) / usual - dt;
-        let by_output = (output[row] - output[row - 1]) * gear.ratio / usual - dt;
+        // Time beyond that of the clock, at the usual pace.
+        let beyond = |motion: f64| motion / usual * period_s - (time[row] - time[row - 1]);
+        let (extra_s, by_output) = (beyond(moved(generator, row)), beyond(moved(output, row) * gear.ratio));
         if extra_s > EXTRA_ROWS * period_s && (by_output - extra_s).abs() < TOGETHER * extra_s {
             found.push((row, extra_s));
         }
