@@ -16,6 +16,7 @@ use std::ops::Range;
 use super::resolution::lattice;
 use super::{Findings, largest_torque, marked, rhythm, straight};
 use crate::measurement::columns::Quantity;
+use crate::measurement::cubic_at_zero;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
@@ -136,7 +137,7 @@ const LEAST_ROWS: usize = 3;
 /// A change by more steps than this is by more than one. *Source*: derived, half way between one step and two.
 const MORE_THAN_ONE: f64 = 1.5;
 /// Changes to and fro between the same two steps within this many rows are one, which noise has torn. *Guess*.
-const TORN_ROWS: f64 = 12.0;
+const TORN_ROWS: usize = 12;
 /// A step that lasts this many times as long as most says little of the load: its rows are left out. *Guess*.
 const LONG: f64 = 8.0;
 /// Rows far from a change are left out as long as this share of the rows stays. *Guess*: fewer would leave little to
@@ -194,71 +195,27 @@ pub(in crate::measurement) fn check_coarse_torque(log: &mut Log, findings: &mut 
 /// Where the load is known, in stretches of a session without a change by more than one step: there it is put on, or
 /// goes on too fast.
 fn stretches(log: &Log, torque: &[f64], step: f64) -> Vec<Vec<Known>> {
-    let mut found: Vec<Vec<Known>> = vec![Vec::new()];
-    // Rows that a change torn by noise begins and ends at, and what it is halfway between.
-    let mut torn: Option<(f64, f64, f64)> = None;
-    let whole = |(from, to, of): (f64, f64, f64)| (0.5 * (from + to), of);
-    for row in 1..torque.len() {
-        let by = (torque[row] - torque[row - 1]).abs();
-        if by == 0.0 && log.continues(row) {
-            continue;
-        }
-        let (at, middle) = (row as f64 - 0.5, 0.5 * (torque[row] + torque[row - 1]));
-        let put_on = by > MORE_THAN_ONE * step || !log.continues(row);
-        torn = match torn {
-            Some((from, to, of)) if of == middle && at - to <= TORN_ROWS && !put_on => Some((from, at, of)),
-            other => {
-                if let (Some(stretch), Some(of)) = (found.last_mut(), other) {
-                    stretch.push(whole(of));
-                }
-                (!put_on).then_some((at, at, middle))
-            }
-        };
-        if put_on {
-            found.push(Vec::new());
-        }
-    }
-    if let (Some(stretch), Some(of)) = (found.last_mut(), torn) {
-        stretch.push(whole(of));
-    }
-    found
+    let changes: Vec<usize> =
+        (1..torque.len()).filter(|row| torque[*row] != torque[row - 1] || !log.continues(*row)).collect();
+    let middle = |row: usize| 0.5 * (torque[row] + torque[row - 1]);
+    let put_on = |row: &usize| (torque[*row] - torque[row - 1]).abs() > MORE_THAN_ONE * step || !log.continues(*row);
+    let known = |torn: &[usize]| (0.5 * (torn[0] + torn[torn.len() - 1]) as f64 - 0.5, middle(torn[0]));
+    let stretch = |changes: &[usize]| {
+        let is_torn = |a: &usize, b: &usize| middle(*a) == middle(*b) && b - a <= TORN_ROWS;
+        changes.chunk_by(is_torn).map(known).collect()
+    };
+    changes.split(put_on).map(stretch).collect()
 }
 
-/// Sweeps that solve for the slopes of a curve. *Source*: derived, each leaves half of what is off at most, and the
-/// slopes of a load are known to less than a millionth then.
-const SWEEPS: usize = 40;
-
-/// Slopes of the natural cubic spline through what is known: of all curves the least bent one, as a load is that a
-/// machine swings. Where pieces meet both are bent alike (Gauss and Seidel).
-fn slopes(known: &[Known]) -> Vec<f64> {
-    let mut slopes = vec![0.0; known.len()];
-    for k in (0..SWEEPS).flat_map(|_| 0..known.len()) {
-        let beside = [k.wrapping_sub(1), k + 1].into_iter().filter(|beside| *beside < known.len());
-        let sides = beside.map(|beside| {
-            let length = known[beside].0 - known[k].0;
-            let chord = (known[beside].1 - known[k].1) / length;
-            [(3.0 * chord - slopes[beside]) / length.abs(), 2.0 / length.abs()]
-        });
-        let [right, on] = sides.fold([0.0; 2], |sum, side| [sum[0] + side[0], sum[1] + side[1]]);
-        slopes[k] = right / on;
-    }
-    slopes
-}
-
-/// Puts a curve through what is known in the place of the torque, within half a step of it, and says of which rows: not
-/// those of a step that lasts `long`.
+/// Puts curves through four places each where the load is known in the place of the torque, within half a step of it,
+/// and says of which rows: not those of a step that lasts `long`.
 fn between(torque: &mut [f64], known: &[Known], step: f64, long: f64, drop: &mut [bool]) {
-    let slopes = slopes(known);
-    for (k, pair) in known.windows(2).enumerate() {
-        let [(from, low), (to, high)] = [pair[0], pair[1]];
-        let length = to - from;
+    for four in known.windows(4) {
+        let (from, to) = (four[1].0, four[2].0);
         for row in from.ceil() as usize..=to.floor() as usize {
-            let share = (row as f64 - from) / length;
-            let rest = 1.0 - share;
-            let curve = rest * rest * ((1.0 + 2.0 * share) * low + share * length * slopes[k])
-                + share * share * ((1.0 + 2.0 * rest) * high - rest * length * slopes[k + 1]);
+            let curve = cubic_at_zero([0, 1, 2, 3].map(|k| (four[k].0 - row as f64, four[k].1)));
             torque[row] = curve.clamp(torque[row] - 0.5 * step, torque[row] + 0.5 * step);
-            drop[row] = length > long;
+            drop[row] = to - from > long;
         }
     }
 }
