@@ -273,23 +273,20 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
 /// A period that does not exist, or a creep to and fro: a unit of time taken for another.
 fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findings) -> Result<(), Refusal> {
     let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return Ok(()) };
-    let mut speeds: Vec<f64> = (1..time.len())
-        .filter(|row| log.continues(*row) && time[*row] > time[*row - 1])
-        .map(|row| (turned(generator, row) / (time[row] - time[row - 1])).abs())
-        .filter(|speed| *speed > 0.0)
-        .collect();
+    let moves: Vec<(usize, f64)> = log.continued().map(|row| (row, turned(generator, row))).collect();
+    let speed = |(row, by): &(usize, f64)| (by / (time[*row] - time[row - 1])).abs();
+    let mut speeds: Vec<f64> = moves.iter().map(speed).filter(|speed| *speed > 0.0 && speed.is_finite()).collect();
     let fastest = quantile_of(&mut speeds, 0.95);
     let lasts_s = period * time.len() as f64;
     let column = columns.iter().find(|column| column.quantity == Quantity::Time && !column.said);
     let (apart, long, slow) = CREEPS_TO_AND_FRO;
     let creeps = period > apart && lasts_s > long && fastest < slow;
-    let moves = || (1..time.len()).filter(|row| log.continues(*row)).map(|row| turned(generator, row));
-    let way = |sign: f64| moves().map(|by| (sign * by).max(0.0)).sum::<f64>();
+    let way = |sign: f64| moves.iter().map(|(_, by)| (sign * by).max(0.0)).sum::<f64>();
     let (there, back) = (way(1.0), way(-1.0));
     let to_and_fro = there.min(back) > EACH_WAY.1.max(EACH_WAY.0 * (there + back));
     // A motor that creeps starts and turns round within a row; one that takes many rows to do so is a fast one.
-    let changes = (2..time.len()).filter(|row| log.continues(*row) && log.continues(row - 1));
-    let change = changes.map(|row| (turned(generator, row) - turned(generator, row - 1)).abs()).fold(0.0, f64::max);
+    let changes = moves.windows(2).filter(|pair| pair[1].0 == pair[0].0 + 1);
+    let change = changes.map(|pair| (pair[1].1 - pair[0].1).abs()).fold(0.0, f64::max);
     let smoothly = change < SMOOTHLY * fastest * period;
     if let Some(column) = column.filter(|_| to_and_fro && smoothly && creeps) {
         let (column, rows, hours) = (&column.name, time.len(), lasts_s / 3600.0);
