@@ -473,7 +473,8 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
         notes.push(format!("the columns of torque are of other joints than {}: none is proposed", listed(&joints)));
         return;
     }
-    // A torque before a current, what was measured before what was wanted, then what explains more.
+    // A torque before a current, what was measured before what was wanted, then what explains more per cent; of two
+    // that are one torque in two units, the last.
     let mut best: Option<((bool, bool, f64), usize)> = None;
     for &k in &candidates {
         let guess = &mut guesses[k];
@@ -490,7 +491,7 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
         } else {
             guess.because("its sign does not show here", 0.4);
         }
-        let rank = (is_torque, !guess.said.commanded, share);
+        let rank = (is_torque, !guess.said.commanded, (100.0 * share).round());
         if best.is_none_or(|(most, _)| rank >= most) {
             best = Some((rank, k));
         }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::least_squares::{Normal, dot};
+use crate::least_squares::{FreeSpan, dot};
 use crate::measurement::{LineFit, least_and_most, rms};
 
 /// Rows that a relation is found on, at most.
@@ -69,36 +69,21 @@ pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file
     files.dedup();
     let (least, most) = least_and_most(rows.iter().map(|row| row[1]));
     let turns = (most - least) / TAU;
-    let scale = rows.iter().map(|row| row[2].abs()).fold(0.0, f64::max);
-    if !(rows.len() > 40 && scale > 0.0) {
-        return None;
+    let column = |of: &dyn Fn(&[f64; 4]) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+    let mut free: Vec<Vec<f64>> =
+        files.iter().map(|file| column(&|row| f64::from(u8::from(row[3] == *file)))).collect();
+    // Within less than a third of a turn a sine and a straight line look alike.
+    if turns > 0.33 {
+        free.extend([column(&|row| row[1].sin()), column(&|row| row[1].cos())]);
+    } else {
+        free.push(column(&|row| row[1]));
     }
-    let columns = |row: &[f64; 4]| -> Vec<f64> {
-        let mut columns: Vec<f64> = files.iter().map(|file| f64::from(u8::from(row[3] == *file))).collect();
-        // Within less than a third of a turn a sine and a straight line look alike.
-        if turns > 0.33 {
-            columns.extend([row[1].sin(), row[1].cos()]);
-        } else {
-            columns.push(row[1]);
-        }
-        columns.push(row[2] / scale);
-        columns
-    };
-    let columns: Vec<Vec<f64>> = rows.iter().map(columns).collect();
-    // The last coefficient of the first columns, and the sum of squares that they leave.
-    let fitted = |width: usize| -> Option<(f64, f64)> {
-        let fit = Normal::of(width, rows.len(), |k, row| {
-            row.copy_from_slice(&columns[k][..width]);
-            (rows[k][0], 1.0)
-        });
-        let values = fit?.values();
-        let left = rows.iter().zip(&columns).map(|(row, columns)| (row[0] - dot(&columns[..width], &values)).powi(2));
-        Some((*values.last()?, left.sum()))
-    };
-    let width = columns[0].len();
-    let (_, without) = fitted(width - 1)?;
-    let (slope, with) = fitted(width)?;
-    Some((slope / scale, 1.0 - with / without.max(f64::MIN_POSITIVE)))
+    let (free, torque) = (FreeSpan::default().beyond(free), column(&|row| row[2]));
+    let (own, left) = (free.freed(torque.clone()), free.freed(column(&|row| row[0])));
+    // Else nothing is the torque's alone.
+    let moves = rows.len() > 40 && rms(&own) > 1e-6 * rms(&torque);
+    let (square, product) = (dot(&own, &own), dot(&own, &left));
+    moves.then(|| (product / square, product * product / (square * dot(&left, &left)).max(f64::MIN_POSITIVE)))
 }
 
 #[cfg(test)]
