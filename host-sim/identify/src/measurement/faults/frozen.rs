@@ -81,8 +81,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         let of_error = log.runs(error, longest, |a, b| a == b);
         frozen.extend(of_error.into_iter().filter(is_frozen).map(|stretch| (Quantity::Error, stretch, 0.0)));
     }
-    for (channel, stretch, missed) in frozen {
-        findings.add(log.fault(FaultName::FrozenChannel, stretch.clone()), channel, Treatment::Masked, |fault| {
+    for (channel, stretch, missed) in &frozen {
+        findings.add(log.fault(FaultName::FrozenChannel, stretch.clone()), *channel, Treatment::Masked, |fault| {
             fault.size_arcsec = Some(missed / ARCSEC);
             format!(
                 "the {channel} keeps one value over {} rows, in which it should have moved by {:.1} arcsec at the \
@@ -91,12 +91,11 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
                 missed / ARCSEC
             )
         });
-        drop[stretch].fill(true);
+        drop[stretch.clone()].fill(true);
     }
     let left = drop.iter().filter(|dropped| !**dropped).count();
     if 2 * left < rows {
-        let fault = findings.faults.iter().find(|fault| fault.name == FaultName::FrozenChannel);
-        let channel = fault.and_then(|fault| fault.channel).unwrap_or(Quantity::Output);
+        let channel = frozen.first().map_or(Quantity::Output, |(channel, ..)| *channel);
         return Err(Refusal(format!(
             "the {channel} keeps one value over {} of {rows} rows; allowed: at most half of them",
             rows - left

@@ -149,47 +149,42 @@ fn of_error(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     let resolution = seen(log, gear).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
     let largest_n_m = largest_torque(log);
-    let mut all = in_sessions(log, Quantity::Error, least, 1);
-    if are_many(&all, log) {
-        all = in_sessions(log, Quantity::Error, least, OTHERS_OUT);
+    let mut found = in_sessions(log, Quantity::Error, least, 1);
+    if are_many(&found, log) {
+        found = in_sessions(log, Quantity::Error, least, OTHERS_OUT);
     }
     let swings = |(row, _): &Out| {
         let session = log.around(*row);
         let torque = log.get(Quantity::Torque).map(|torque| &torque[session.clone()]);
         torque.is_some_and(|torque| load_swings(torque, row - session.start, largest_n_m))
     };
-    let (moved, found): (Vec<Out>, Vec<Out>) = all.into_iter().partition(swings);
-    let some = |found: &[Out]| (1.0..=SHARE * log.len() as f64).contains(&(found.len() as f64));
-    let mut drop = vec![false; log.len()];
-    let mut drop_all = |found: &[Out]| found.iter().for_each(|(row, _)| drop[*row] = true);
-    if some(&moved) {
-        findings.notes.push(format!(
-            "{} single rows stand out where the load swings within a row, and the drive with it; they are left out",
-            moved.len()
-        ));
-        drop_all(&moved);
-    }
-    let number = found.len();
-    let mut many = false;
-    if some(&found) {
-        let generator = log.of(Quantity::Generator);
-        let fast = found.iter().all(|(row, _)| (generator[row + 1] - generator[row - 1]).abs() > 2.0 * TOOTH_RAD);
-        let large = found.iter().any(|(_, by)| by.abs() > LARGE_RAD);
-        if (number < FEW || fast) && !large {
-            findings.notes.push(format!(
-                "{number} single rows stand out: too few, or in too fast a motion, to tell drive from data"
-            ));
-        } else if repeat_with_position(generator, &found, gear) {
-            findings
-                .notes
-                .push(format!("{number} single rows stand out, always in the same position: the drive, not the data"));
-        } else {
-            report(log, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
-            drop_all(&found);
-            many = are_many(&found, log);
+    let (mut moved, mut found): (Vec<Out>, Vec<Out>) = found.into_iter().partition(swings);
+    for rows in [&mut moved, &mut found] {
+        if rows.len() as f64 > SHARE * log.len() as f64 {
+            rows.clear();
         }
     }
-    log.leave_out(&drop);
+    let (count, number, generator) = (moved.len(), found.len(), log.of(Quantity::Generator));
+    if count > 0 {
+        findings.notes.push(format!(
+            "{count} single rows stand out where the load swings within a row, and the drive with it; they are left out"
+        ));
+    }
+    let fast = found.iter().all(|(row, _)| (generator[row + 1] - generator[row - 1]).abs() > 2.0 * TOOTH_RAD);
+    let large = found.iter().any(|(_, by)| by.abs() > LARGE_RAD);
+    let of_the_drive = if (number < FEW || fast) && !large {
+        Some(": too few, or in too fast a motion, to tell drive from data")
+    } else {
+        let repeat = repeat_with_position(generator, &found, gear);
+        repeat.then_some(", always in the same position: the drive, not the data")
+    };
+    if let Some(why) = of_the_drive.filter(|_| number > 0) {
+        findings.notes.push(format!("{number} single rows stand out{why}"));
+        found.clear();
+    }
+    report(log, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
+    let many = are_many(&found, log);
+    log.leave_out(&marked(log.len(), moved.into_iter().chain(found).map(|(row, _)| row)));
     if many {
         let tail = (TAIL * noise).max(STEPS * resolution);
         let more: usize = (0..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(log, tail)).sum();
