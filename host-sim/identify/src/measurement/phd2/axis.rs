@@ -45,12 +45,8 @@ fn shorter(turns: f64) -> f64 {
 pub(super) fn stands(sections: &[Pointing], ratio: f64) -> (Vec<f64>, Vec<String>) {
     let clock = |section: &Pointing| section.begins_s / SIDEREAL_DAY_S;
     let mut targets: Vec<Target> = Vec::new();
-    let mut of: Vec<Option<(usize, f64)>> = Vec::new();
-    for section in sections {
-        let Some(WrittenNumber { value, decimals }) = section.hour_angle else {
-            of.push(None);
-            continue;
-        };
+    let target_of = |section: &Pointing| {
+        let WrittenNumber { value, decimals } = section.hour_angle?;
         let axis = value / HOURS + if section.west { 0.5 } else { 0.0 };
         let within = 10f64.powi(-decimals) / HOURS;
         let apart = |target: &Target| shorter(axis - clock(section) - target.offset);
@@ -62,8 +58,9 @@ pub(super) fn stands(sections: &[Pointing], ratio: f64) -> (Vec<f64>, Vec<String
         let target = &mut targets[place];
         target.sections += 1.0;
         target.offset += shorter(axis - clock(section) - target.offset) / target.sections;
-        of.push(Some((place, axis)));
-    }
+        Some((place, axis))
+    };
+    let of: Vec<Option<(usize, f64)>> = sections.iter().map(target_of).collect();
     let said = |(section, of): (&Pointing, &Option<(usize, f64)>)| {
         of.map(|(place, axis)| axis + shorter(targets[place].offset - (axis - clock(section))))
     };
