@@ -77,6 +77,12 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
 /// Sessions or turns that a message lists; of more it lists the first ones.
 const LISTED: usize = 6;
 
+fn listed(all: impl IntoIterator<Item = String>) -> String {
+    let mut all = all.into_iter();
+    let first: Vec<String> = all.by_ref().take(LISTED).collect();
+    first.join(", ") + if all.next().is_some() { ", …" } else { "" }
+}
+
 /// A row, and the turns by which the generator's angle is off from it on.
 type Turns = (usize, f64);
 
@@ -145,29 +151,23 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
             ));
         }
     }
-    let list: Vec<String> = restarts.iter().take(LISTED).map(|(_, turns)| format!("{turns:+.0}")).collect();
     take_turns_out(log, &restarts, FaultName::CounterRestart, gear, findings, |_| {
         format!(
-            "the generator's counter begins anew before {} of {} sessions, by {}{} turns of the motor: they are put \
-             back",
+            "the generator's counter begins anew before {} of {} sessions, by {} turns of the motor: they are put back",
             restarts.len(),
             sessions.len(),
-            list.join(", "),
-            if restarts.len() > list.len() { ", …" } else { "" }
+            listed(restarts.iter().map(|(_, turns)| format!("{turns:+.0}")))
         )
     });
     let largest_arcsec = farthest(others.iter().map(|(_, jump)| *jump)) / ARCSEC;
     let fault = log.fault(FaultName::PositionJump, others.iter().map(|(row, _)| *row));
     findings.add(fault, None::<Quantity>, Treatment::Repaired, |fault| {
         fault.size_arcsec = Some(largest_arcsec);
-        let numbers: Vec<String> =
-            others.iter().take(LISTED).map(|(row, _)| (log.number(*row) + 1).to_string()).collect();
         format!(
-            "the zero of {} sessions ({}{}) is another one, by up to {largest_arcsec:.0} arcsec, which is no whole \
+            "the zero of {} sessions ({}) is another one, by up to {largest_arcsec:.0} arcsec, which is no whole \
              number of motor turns or tooth pitches: the zero of each is fitted on its own",
             others.len(),
-            numbers.join(", "),
-            if others.len() > LISTED { ", …" } else { "" }
+            listed(others.iter().map(|(row, _)| (log.number(*row) + 1).to_string()))
         )
     });
     log.get_mut(Quantity::Output).into_iter().for_each(|output| add_steps(output, &others, -1.0));
