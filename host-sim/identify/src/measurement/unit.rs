@@ -200,9 +200,7 @@ impl Reading {
 
     /// A number in the unit used inside: rad, s, N·m, °C.
     pub fn value(&self, number: f64) -> f64 {
-        // Exactly as it was before there were gains.
-        let scaled = if self.gain == 1.0 && self.offset == 0.0 { number } else { self.gain * number + self.offset };
-        scaled * self.unit.factor() + self.unit.zero()
+        (self.gain * number + self.offset) * self.unit.factor() + self.unit.zero()
     }
 
     /// The unit in which faults are looked for: a count divided is a turn.

@@ -42,12 +42,11 @@ const WHOLE: f64 = 0.08;
 /// The step of the lattice on which `values` lie, or `None` if they lie on none.
 pub(super) fn lattice(values: &[f64]) -> Option<f64> {
     let places = (values.len() / ROWS).clamp(1, 5);
-    let mut found: Vec<f64> = (0..places)
-        .filter_map(|k| {
-            let from = (values.len() - ROWS.min(values.len())) * k / places.max(2).saturating_sub(1).max(1);
-            of_piece(&values[from.min(values.len())..(from + ROWS).min(values.len())])
-        })
-        .collect();
+    let of_place = |k: usize| {
+        let from = values.len().saturating_sub(ROWS) * k / (places - 1).max(1);
+        of_piece(&values[from..(from + ROWS).min(values.len())])
+    };
+    let mut found: Vec<f64> = (0..places).filter_map(of_place).collect();
     // A piece in which few steps occur shows a multiple of the lattice; most pieces have to show one.
     (2 * found.len() > places).then(|| median_of(&mut found))
 }
