@@ -31,7 +31,7 @@ pub(crate) fn hanging(on: &Excitation<'_>, explained: &[f64], white: f64) -> Vec
     }
     let left = on.left(explained);
     for session in &rows.sessions {
-        for MayHang { rows: event, side } in may_hang(rows, session, &on.base.flank, on.nominal.friction_torque_n_m) {
+        for MayHang { rows: event, side } in may_hang(rows, session, on.nominal.friction_torque_n_m) {
             let short = |k: &usize| left[*k] * side > least;
             let Some(last) = event.clone().rev().find(short) else { continue };
             let over = event.start..last + 1;
@@ -52,31 +52,23 @@ struct MayHang {
     side: f64,
 }
 
-/// Rows of a session in which a load of the other side has not been so large yet that it must have moved the output.
-fn may_hang(rows: &Rows, session: &Range<usize>, flank: &[f64], friction_n_m: f64) -> Vec<MayHang> {
+/// Rows of a session from a change of the load's side on until it has been so large, or so long, that it must have moved
+/// the output.
+fn may_hang(rows: &Rows, session: &Range<usize>, friction_n_m: f64) -> Vec<MayHang> {
     let mut events: Vec<MayHang> = Vec::new();
-    // The side of the load that carried last, 0 if the output has left it, and since when the load is on another one.
-    let mut side = rows.torque.get(session.start).map_or(0.0, |torque| torque.signum());
-    let mut since: Option<f64> = None;
-    for k in session.clone() {
+    // The load's side, and since when it has been there while the output may still be on the other.
+    let (mut now, mut since): (f64, Option<f64>) = (0.0, None);
+    for k in session.clone().filter(|k| rows.torque[*k].abs() > friction_n_m) {
         let torque = rows.torque[k];
-        if torque.abs() <= friction_n_m {
-            // Without a load the motion may push it off.
-            side = if flank[k] * side < 0.999 { 0.0 } else { side };
-            since = None;
-            continue;
+        if torque * now <= 0.0 {
+            since = (now != 0.0).then_some(rows.time[k]);
+            now = torque.signum();
         }
-        if torque * side > 0.0 {
-            since = None;
-            continue;
-        }
-        let changed = *since.get_or_insert(rows.time[k]);
-        if torque.abs() >= CARRIES * friction_n_m || rows.time[k] - changed >= HANGS_S {
-            (side, since) = (torque.signum(), None);
-        } else if side != 0.0 {
+        since = since.filter(|since| torque.abs() < CARRIES * friction_n_m && rows.time[k] - since < HANGS_S);
+        if since.is_some() {
             match events.last_mut() {
-                Some(event) if event.rows.end == k && event.side == side => event.rows.end = k + 1,
-                _ => events.push(MayHang { rows: k..k + 1, side }),
+                Some(event) if event.rows.end == k && event.side == -now => event.rows.end = k + 1,
+                _ => events.push(MayHang { rows: k..k + 1, side: -now }),
             }
         }
     }
@@ -85,7 +77,6 @@ fn may_hang(rows: &Rows, session: &Range<usize>, flank: &[f64], friction_n_m: f6
 
 #[cfg(test)]
 mod tests {
-    use super::super::base::PlayLaw;
     use super::*;
     use crate::measurement::Session;
     use crate::synthesize::catalogue_drive;
@@ -108,18 +99,15 @@ mod tests {
         let nominal = catalogue_drive();
         let events = |times_friction: &[f64], period_s: f64| {
             let rows = rows_of(times_friction, period_s);
-            let flank = PlayLaw::Held.flanks(&rows, &rows.torque, &nominal);
-            may_hang(&rows, &rows.sessions[0], &flank, nominal.friction_torque_n_m)
+            may_hang(&rows, &rows.sessions[0], nominal.friction_torque_n_m)
         };
         let event = |rows: Range<usize>, side: f64| MayHang { rows, side };
         assert_eq!(events(&[9.0, 1.5, -0.5, -1.5, -1.5, -2.5, -1.5], 0.01), [event(3..5, 1.0)]);
-        // Back to the side that it never left.
-        assert_eq!(events(&[9.0, -1.5, 1.5, 9.0, -9.0], 0.01), [event(1..2, 1.0)]);
+        // Back to a side that it may have left.
+        assert_eq!(events(&[9.0, -1.5, 1.5, 9.0, -9.0], 0.01), [event(1..2, 1.0), event(2..3, -1.0)]);
         // Beyond friction for long.
         assert_eq!(events(&[9.0, -1.5, -1.5, -1.5], 2.0), [event(1..3, 1.0)]);
         assert_eq!(events(&[1.5, 1.5, 1.5, 1.5], 0.01), []);
-        // Pushed off without a load, and back.
-        let rows = rows_of(&[-9.0, -0.5, -0.5, -1.5, -2.5], 0.01);
-        assert_eq!(may_hang(&rows, &rows.sessions[0], &[-1.0, 0.0, 1.0, -1.0, -1.0], nominal.friction_torque_n_m), []);
+        assert_eq!(events(&[-9.0, -0.5, 0.5, -1.5, -2.5], 0.01), []);
     }
 }

@@ -1308,13 +1308,17 @@ fn hanging(mut sessions: Vec<Session>, drive: &Nominal) -> Vec<Session> {
         let torque = session.torque_n_m.as_mut().unwrap();
         let begins: Vec<usize> =
             (1..torque.len() - 20).filter(|k| torque[k - 1].abs() <= friction && torque[*k].abs() > friction).collect();
-        let mut changes = 0;
+        let (mut changes, mut over) = (0, 0);
         for k in begins {
+            if k < over {
+                continue;
+            }
             let before = (0..k).rev().map(|j| torque[j]).find(|t| t.abs() > friction).unwrap_or(0.0).signum();
             let now = torque[k].signum();
             changes += usize::from(before * now < 0.0);
             if before * now < 0.0 && changes % 3 == 0 {
-                for j in k..(k + 10 + 7 * (changes % 4)).min(torque.len()) {
+                over = (k + 10 + 7 * (changes % 4)).min(torque.len());
+                for j in k..over {
                     session.error_rad[j] +=
                         before * across_rad + drive.wind_up_arcsec(1.4 * friction * now - torque[j]) / ARCSEC_PER_RAD;
                     torque[j] = 1.4 * friction * now;
