@@ -336,6 +336,9 @@ const LEAST_STEP: f64 = 0.3;
 /// Gauss-Newton steps at most. *Guess*: three or four converge, if any do.
 const STEPS: usize = 6;
 
+/// Share of two squares that the square of their product is where columns are one. *Guess*: beyond round-off.
+const SAME: f64 = 1.0 - 1e-9;
+
 /// How far a place may move.
 const MOVE: Prior = Prior { mean: 0.0, std: PLACE_SPREAD };
 
@@ -498,6 +501,24 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             starts.push(at);
             at += term.len();
         }
+        // Columns of the terms: which term's, where, whether a main one.
+        let columns: Vec<(usize, usize, bool)> = (0..all.len())
+            .flat_map(|term| {
+                let of = all[term].tolerances.iter().zip(starts[term]..);
+                of.map(move |(of, at)| (term, at, matches!(of, Tolerance::Main(_))))
+            })
+            .collect();
+        let is_one = |a: usize, b: usize| {
+            let [both, a, b] = [(a.max(b), a.min(b)), (a, a), (b, b)].map(|(i, j)| gram.at(i, j));
+            both * both > SAME * a * b
+        };
+        let owned: Vec<usize> = columns
+            .iter()
+            .filter(|(term, at, main)| {
+                !main && columns.iter().any(|(other, own, main)| *main && other != term && is_one(*at, *own))
+            })
+            .map(|(_, at, _)| *at)
+            .collect();
         let mut last: Option<(Solution, Vec<Prior>)> = None;
         for round in 0..ROUNDS {
             let mut priors = problem.base_priors();
@@ -506,6 +527,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 priors.extend(term.priors(known));
             }
             priors.extend(moves.iter().flat_map(|moves| moves.iter()).map(|_| MOVE));
+            // A column has one owner: what is a cause of its own here is no deviation of another one.
+            owned.iter().for_each(|k| priors[*k].std *= HELD);
             let mut deviations = vec![false; starts.first().copied().unwrap_or(0)];
             if round + 1 == ROUNDS {
                 deviations

@@ -1270,6 +1270,20 @@ fn at_one_speed_and_load_nothing_makes_a_load_swing() {
     }
 }
 
+/// Beside an eccentric disc the tilt of it is no overtone.
+#[test]
+fn two_orders_of_an_encoder_have_an_owner_each() {
+    let effects = [
+        "output_encoder_eccentricity:amplitude_arcsec=85,phase_rad=0.4",
+        "output_encoder_tilt:amplitude_arcsec=80,phase_rad=2",
+    ];
+    let found = diagnosed(&effects, 31);
+    assert_eq!(names(&found), [CauseName::OutputEncoderEccentricity, CauseName::OutputEncoderTilt], "{}", found.text());
+    let tilt = found.causes.iter().find(|cause| cause.name == CauseName::OutputEncoderTilt).unwrap();
+    let amplitude = tilt.parameters["amplitude_arcsec"];
+    assert!((amplitude.value - 80.0).abs() < 1.5, "{}", found.text());
+}
+
 #[test]
 fn half_a_minute_wears_nothing_and_a_part_of_a_turn_shows_no_second_order() {
     let short = Session {
