@@ -28,9 +28,12 @@ const FARTHEST_WIND_UP_RAD: f64 = 0.02;
 const STEPS_OF_A_PITCH: u32 = 16;
 /// Places over an output turn that waves of a table are fitted to. *Guess*: dozens for each of its orders.
 const PLACES_OF_A_TURN: u32 = 4000;
+/// Spread of a spring that a calibration has found, of it. *Guess*: the softness under light loads that play hides.
+const SPRING_OF_A_CALIBRATION: f64 = 0.2;
 /// Half a backlash that shows nowhere, arcsec. *Guess*: it stands for none where one may be.
 const LEAST_HALF_ARCSEC: f64 = 0.1;
-/// Waves in a turn of the generator that every strain wave gear has, and their first overtone.
+/// Waves in a turn of the generator, or of its wave on the wheel that turns, that every strain wave gear has, and their
+/// first overtone.
 pub(crate) const OF_TWO_LOBES: [f64; 2] = [2.0, 4.0];
 
 /// Tooth counts of a strain wave drive.
@@ -253,24 +256,28 @@ impl Nominal {
     }
 
     /// That of a table whose gear is known by its ratio alone, with the waves that the two lobes of a generator make in
-    /// a turn of it.
+    /// a turn of it and of the wave on the wheel that turns.
     pub(crate) fn of_table_by_ratio(table: &Table<'_>, ratio: f64) -> Nominal {
         let nominal = Nominal::of_table(table);
         let at = State { temperature_c: nominal.temperature_c, way: 1.0, ..State::default() };
         let steady_at = |psi: &f64| steady(table, &State { generator_rad: *psi, ..at }, 0.0);
         let angles: Vec<f64> = (0..PLACES_OF_A_TURN).map(|k| TAU * ratio * (f64::from(k) * GOLDEN).fract()).collect();
         let errors: Vec<f64> = angles.iter().map(steady_at).collect();
-        let harmonics = harmonics(&angles, &errors, &OF_TWO_LOBES).map_or_else(Vec::new, |(_, lines)| lines);
+        let on_wheel = OF_TWO_LOBES.map(|order| order * (1.0 - 1.0 / ratio));
+        let orders = [OF_TWO_LOBES, on_wheel].concat();
+        let harmonics = harmonics(&angles, &errors, &orders).map_or_else(Vec::new, |(_, lines)| lines);
         let harmonics = harmonics.into_iter().map(|line| Harmonic {
             order_per_generator_turn: line.order,
             amplitude_arcsec: line.amplitude,
             phase_rad: line.phase_rad,
         });
-        // A spring that is soft under light loads, and play, are much alike to a calibration: what floats is play.
+        // A spring that is soft under light loads, and play, are much alike to a calibration, and both float.
         let half_arcsec = (0.5 * nominal.backlash_arcsec).max(LEAST_HALF_ARCSEC);
-        let spread = Spread { backlash: HALF_A_LOST_MOTION_ARCSEC / half_arcsec, ..nominal.spread };
+        let backlash = HALF_A_LOST_MOTION_ARCSEC / half_arcsec;
+        let spread = Spread { stiffness: SPRING_OF_A_CALIBRATION, backlash, ..nominal.spread };
         let (harmonics, backlash_arcsec) = (harmonics.collect(), 2.0 * half_arcsec);
-        Nominal { ratio, teeth: None, harmonics, backlash_arcsec, spread, ..nominal }
+        let friction_torque_n_m = dead_zone_n_m(table);
+        Nominal { ratio, teeth: None, harmonics, backlash_arcsec, friction_torque_n_m, spread, ..nominal }
     }
 
     /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit,

@@ -43,7 +43,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use flexspline_mechanics::drive::GeneratorKind;
 pub(crate) use folds::LEAST_GAIN;
-use folds::{Chosen, Folds};
+use folds::{Chosen, Folds, PENALTIES};
 pub(crate) use interval::OF_95;
 pub use interval::{ModelUncertainty, Node, RowNoise};
 
@@ -69,6 +69,11 @@ const FEWEST_ROWS: usize = 64;
 /// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load
 /// of interest.
 const LEAST_FRICTION: f64 = 0.02;
+/// Frictions that are tried where none is known, of that: from 1 to 20 % of the largest load. *Source*: what starts a
+/// drive of the catalogue (CSG-14 to 25, 100), through the ratio, is 7 to 21 % of its rated torque.
+const FRICTIONS: [f64; 10] = [0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 10.0];
+/// Rows that tell a friction, about. *Guess*: hundreds of them lie at loads around it.
+const FRICTION_WITH: usize = 6000;
 /// Rows between two dead zones tell them apart if their load is clear of both by this multiple of the torque's noise…
 /// *Guess*.
 const CLEAR_OF_NOISE: f64 = 6.0;
@@ -521,9 +526,10 @@ fn calibrated<T>(
         delays.take_out(&mut files, prior.nominal.ratio);
         rows = settled(&files, prior, &recorded);
     }
-    if let Some(table) = prior.table {
-        recorded.scales.friction_n_m = dead_zone(&rows, prior, table, &recorded);
-    }
+    recorded.scales.friction_n_m = match prior.table {
+        Some(table) => dead_zone(&rows, prior, table, &recorded),
+        None => friction_of(&rows, prior, &recorded),
+    };
     rows = rows.sure(recorded.scales.friction_n_m, &recorded);
     let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
     let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
@@ -823,6 +829,29 @@ fn with_faults(error: CalibrationError, files: &[Recording], said: &[String]) ->
         }
         other => other,
     }
+}
+
+/// Load below which the direction decides the flank without a table, N·m: that of the prior, or of those tried the one
+/// beside which all parts together leave least in rows left out.
+fn friction_of(rows: &Rows, prior: &Prior<'_>, recorded: &Recorded) -> f64 {
+    let usual = recorded.scales.friction_n_m;
+    if prior.friction_n_m() > 0.0 {
+        return usual;
+    }
+    let every = rows.rows.len().div_ceil(FRICTION_WITH).max(1);
+    let mut some = rows.clone().less(prior);
+    some.rows = some.rows.into_iter().step_by(every).collect();
+    let parts = recorded.shown(PartName::ALL, prior);
+    let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[1] }).collect();
+    let left = |friction_n_m: f64| {
+        let folds = some.folds_of(&parts, &Scales { friction_n_m, ..recorded.scales });
+        (friction_n_m, folds.left_out(&folds.all(), &chosen))
+    };
+    let least = |tried: &[(f64, f64)]| tried.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(usual, |best| best.0);
+    let tried = FRICTIONS.map(|times| left(times * usual));
+    let best = least(&tried);
+    // At the end of them something else goes on as far as one lets it: a load that was not recorded.
+    if best < tried[tried.len() - 1].0 { least(&[0.84, 1.0, 1.19].map(|times| left(times * best))) } else { usual }
 }
 
 /// Load below which the direction decides the flank beside a table, N·m: its own dead zone, unless rows with loads

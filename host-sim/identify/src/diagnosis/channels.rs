@@ -337,8 +337,9 @@ const WORTH_A_ROUND: f64 = 0.999;
 
 /// A load in addition to that of the torque column: a constant, an unbalanced load (sine and cosine), a drag. N·m.
 type Beside = [f64; 4];
-/// The place of the constant among these, and those of the rivals of a zero.
+/// The place of the constant among these, those of an unbalanced load, and those of the rivals of a zero.
 const CONSTANT: Range<usize> = 0..1;
+const UNBALANCED: Range<usize> = 1..3;
 const RIVALS: Range<usize> = 1..4;
 
 /// A load that was tried, and what it leaves in each block: the sum of the magnitudes, which the rows of a flank turned
@@ -421,15 +422,18 @@ fn followed(recording: &Recording, nominal: &Nominal) -> Option<Rows> {
     (winds_up && rows.count_used() >= SAMPLE / 4).then_some(rows)
 }
 
-/// Frictions of the play that are tried, of the one stated. *Guess*: each beyond what [`super::base::NEAR_FRICTION`]
+/// Frictions of the play that are tried, of the one stated. *Guess*: each within what [`super::base::NEAR_FRICTION`]
 /// sets aside of the one before it, as far as drives of one catalogue may differ.
-const FRICTIONS: [f64; 6] = [0.3, 0.45, 0.67, 1.5, 2.25, 3.4];
+const FRICTIONS: [f64; 13] = [0.3, 0.37, 0.45, 0.55, 0.67, 0.82, 1.0, 1.22, 1.5, 1.84, 2.25, 2.77, 3.4];
 /// The one that they are of where none is stated, of the load. *Guess*: the grid ends at 2 and 20 % of it.
 const FRICTION_OF_LOAD: f64 = 0.06;
+/// Where none is stated it takes at least this share of what a load that nobody read would take. *Guess*: that has
+/// three numbers to its one, and no drive is without friction.
+const TAKES_OF_LOAD: f64 = 0.5;
 
 /// Takes the friction of the play that the rows show in place of the one stated, which no catalogue prints, where it
-/// leaves less for certain; with a note. Else what changes its flank elsewhere would look like a zero of the torque, a
-/// step of an encoder, or a cause.
+/// leaves less for certain, and of none; with a note. Else what changes its flank elsewhere would look like a zero of
+/// the torque, a step of an encoder, or a cause.
 pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, table: Option<&Table<'_>>) {
     let Some(rows) = followed(recording, nominal) else { return };
     let stated = nominal.friction_torque_n_m;
@@ -450,15 +454,17 @@ pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, ta
     let tried = FRICTIONS.map(|share| (share * of, leaves(share * of)));
     let Some((n_m, best)) = tried.iter().min_by(|a, b| sum(&a.1, None).total_cmp(&sum(&b.1, None))) else { return };
     let left = sum(best, None) / sum(&as_stated, None);
-    // A load that nobody read changes the flank elsewhere, too.
-    let rivals = || sampled.tried(PlayLaw::Held, [0.0; 4], CONSTANT.start..RIVALS.end);
-    if left <= 1.0 - LEAST_GAIN
-        && is_certain(&as_stated, best, GAIN_CERTAIN)
-        && sum(best, None) < sum(least(&rivals(), None), None)
-    {
+    // A load that nobody read changes the flank elsewhere, too; a drag where no friction is known is that friction.
+    let (others, share) = if stated > 0.0 { (RIVALS, 1.0) } else { (UNBALANCED, TAKES_OF_LOAD) };
+    let rivals = || sampled.tried(PlayLaw::Held, [0.0; 4], CONSTANT.start..others.end);
+    let taken = |by: &Tried| sum(&as_stated, None) - sum(by, None);
+    let certain = || left <= 1.0 - LEAST_GAIN && is_certain(&as_stated, best, GAIN_CERTAIN);
+    if left < 1.0 && (stated == 0.0 || certain()) && taken(best) > share * taken(least(&rivals(), None)) {
+        let known =
+            if stated > 0.0 { format!("the model states a friction of {stated:.2}") } else { "none is known".into() };
         recording.notes.push(format!(
-            "the output changes its flank at a load of about {n_m:.2} N·m, where the model states a friction of \
-             {stated:.2}: with that {:.0} % less is left, and it takes its place",
+            "the output changes its flank at a load of about {n_m:.2} N·m, the friction of its play, where {known}: with \
+             that {:.0} % less is left, and it takes its place",
             100.0 * (1.0 - left)
         ));
         nominal.friction_torque_n_m = *n_m;
