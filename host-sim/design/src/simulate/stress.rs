@@ -10,54 +10,15 @@
 //!
 //! The circular spline is recovered in the frame that turns with it; the invariant does not see the turn.
 
-use rayon::prelude::*;
-
 use super::places::largest_of;
-use flexspline_mechanics::fem::element::{cauchy_stress, extrapolate_to_nodes};
+use flexspline_mechanics::fem::element::nodal_stress;
 use flexspline_mechanics::fem::material::PlaneStrain;
 use flexspline_mechanics::mesh::{WheelKind, WheelMesh};
 use flexspline_mechanics::stepping::{Problem, State};
 
-/// Cauchy stress `[s11, s22, s12]` (MPa) at every node of a wheel with nodal displacements `field` (x and y of each
-/// node).
-pub(crate) fn nodal_stress(mesh: &WheelMesh, material: &PlaneStrain, field: &[f64]) -> Vec<[f64; 3]> {
-    assert_eq!(field.len(), 2 * mesh.nodes.len(), "two displacements for each node");
-    let at_nodes: Vec<[[f64; 3]; 8]> = mesh
-        .elements
-        .par_iter()
-        .zip(&mesh.gauss)
-        .with_min_len(256)
-        .map(|(element, points)| {
-            let mut u = [0.0; 16];
-            for (a, &n) in element.iter().enumerate() {
-                u[2 * a] = field[2 * n as usize];
-                u[2 * a + 1] = field[2 * n as usize + 1];
-            }
-            let at_points = cauchy_stress(points, material, &u);
-            let of = [0, 1, 2].map(|component| extrapolate_to_nodes(&at_points.map(|s| s[component])));
-            std::array::from_fn(|a| [of[0][a], of[1][a], of[2][a]])
-        })
-        .collect();
-    // Summed in the order of the elements, whatever thread they were computed on.
-    let mut sum = vec![[0.0; 3]; mesh.nodes.len()];
-    let mut elements_at = vec![0.0_f64; mesh.nodes.len()];
-    for (element, stresses) in mesh.elements.iter().zip(&at_nodes) {
-        for (&n, stress) in element.iter().zip(stresses) {
-            for (total, s) in sum[n as usize].iter_mut().zip(stress) {
-                *total += s;
-            }
-            elements_at[n as usize] += 1.0;
-        }
-    }
-    for (stress, count) in sum.iter_mut().zip(elements_at) {
-        *stress = stress.map(|s| s / count);
-    }
-    sum
-}
-
 /// Von Mises stress (MPa) at every node of a wheel.
 pub fn nodal_von_mises(mesh: &WheelMesh, material: &PlaneStrain, field: &[f64]) -> Vec<f64> {
-    nodal_stress(mesh, material, field).into_iter().map(|stress| material.von_mises(stress)).collect()
+    nodal_stress((&mesh.elements, &mesh.gauss), material, field).into_iter().map(|s| material.von_mises(s)).collect()
 }
 
 /// The most stressed node.
@@ -135,7 +96,8 @@ mod tests {
             WheelMesh::circular_spline(&drive, MeshLevel::Coarse).unwrap(),
         ] {
             let strain = 1e-6;
-            let stress = nodal_stress(&mesh, &steel(), &field_of(&mesh, |x| [strain * x[0], 0.0]));
+            let field = field_of(&mesh, |x| [strain * x[0], 0.0]);
+            let stress = nodal_stress((&mesh.elements, &mesh.gauss), &steel(), &field);
             let (lambda, mu) = (steel().lambda, steel().mu);
             let expected = [(lambda + 2.0 * mu) * strain, lambda * strain, 0.0];
             for found in stress {

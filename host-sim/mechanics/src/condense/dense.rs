@@ -116,9 +116,8 @@ kernel!(Backward<W> {
         let known = dot_sides(&column[p..], rest);
         // x holds the unsigned forward result from k up to here, the solution beyond.
         let later = dot_sides(&column[k + 1..p], &x[k + 1..]);
-        for w in 0..W {
-            x[k][w] = (sign * (x[k][w] - known[w]) - later[w]) / column[k];
-        }
+        let forward = x[k];
+        x[k] = std::array::from_fn(|w| (sign * (forward[w] - known[w]) - later[w]) / column[k]);
     }
 });
 

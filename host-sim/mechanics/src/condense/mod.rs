@@ -19,7 +19,7 @@ pub use corotation::{CellState, CoRotation};
 pub(crate) use dense::{Multiply, kernel};
 pub use dense::{one, one_mut};
 pub use model::{Cell, CondensedWheel};
-pub(crate) use tangent::Reduce;
 pub use tangent::{
     CellAt, CellPlacement, CellTangent, Sides, Traction, Turn, back, put, rotate_pairs, rotate_sides, take,
 };
+pub(crate) use tangent::{Reduce, dot};

@@ -301,14 +301,13 @@ kernel!(Reduce {
             *x -= dot(earlier, bore);
         }
         c -= dot(bore, bore);
-        for col in 0..i {
+        for (col, column) in matrix.chunks_exact_mut(n).take(i).enumerate() {
             let (ga, aa) = (a[col], faces[col] + c * a[col]);
-            for row in col..i {
-                matrix[row + col * n] += faces[row] * ga + a[row] * aa;
+            let (on_faces, on_tractions) = column.split_at_mut(i);
+            for ((x, g), a) in on_faces[col..].iter_mut().zip(&faces[col..]).zip(&a[col..]) {
+                *x += g * ga + a * aa;
             }
-            for (row, x) in geometric_tractions.iter().enumerate() {
-                matrix[i + row + col * n] += x * ga;
-            }
+            on_tractions.iter_mut().zip(&geometric_tractions).for_each(|(x, g)| *x += g * ga);
         }
         tangent.extra.truncate(done + b);
         tangent.turn_rate.extend_from_slice(a);
@@ -350,7 +349,7 @@ pub fn rotate_pairs(x: &mut [f64], turn: Turn) {
 
 /// Dot product in four strands: at these lengths a kernel is not worth its call.
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a4, b4) = (a[..n].chunks_exact(4), b[..n].chunks_exact(4));
     let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();

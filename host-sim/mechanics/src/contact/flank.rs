@@ -628,17 +628,22 @@ impl<'a> FlankContact<'a> {
         peak_pressure_mpa(&places, bearing.peak_over_mean, modulus_mpa, least_radius)
     }
 
-    /// Gap of every integration point where the face is nearest, how it changes as the output alone turns (mm/rad), and
-    /// its weight; with the offsets along the face, where there are any.
-    pub fn gaps(
+    /// Gap of the integration points where the face is nearest, how it changes as the output alone turns (mm/rad), and
+    /// their weight; with the offsets along the face, where there are any. Points that a glance finds further apart
+    /// than `within_mm` are left out.
+    pub(crate) fn gaps(
         &self,
         (pair, at): PairAt<'_>,
         points: &[FlankPoint],
+        within_mm: f64,
         report: &mut impl FnMut(f64, f64, f64),
     ) -> Option<Across> {
         let field = self.local_field(pair, at);
         for point in points {
             let x = self.seen_from_space(&field, &point.place);
+            if self.least_distance(&field, x) > within_mm {
+                continue;
+            }
             let foot = self.foot(pair, &field, x);
             let [nx, ny] = foot.normal;
             report(foot.distance, pair.side.sign() * (nx * x[1] - ny * x[0]), point.weight);

@@ -19,6 +19,9 @@
 //! which needs no strain-displacement matrix (Belytschko, Liu, Moran, Nonlinear Finite Elements, 4.9, specialised).
 //! Everything is per unit width: forces N/mm, stiffness N/mm per mm.
 
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::condense::kernel;
 use crate::fem::material::PlaneStrain;
 
 /// Length of the packed lower triangle of a 16 x 16 element matrix: entry (i, j <= i) sits at `i (i+1)/2 + j`.
@@ -126,7 +129,7 @@ pub fn gauss_points(coordinates: &[[f64; 2]; 8]) -> Result<[GaussPoint; 4], Fold
 }
 
 /// Deformation gradient `[F11, F12, F21, F22]` at an integration point.
-#[inline]
+#[inline(always)]
 fn deformation_gradient(point: &GaussPoint, u: &[f64; 16]) -> [f64; 4] {
     let mut f = [1.0, 0.0, 0.0, 1.0];
     for (a, g) in point.gradient.iter().enumerate() {
@@ -139,7 +142,7 @@ fn deformation_gradient(point: &GaussPoint, u: &[f64; 16]) -> [f64; 4] {
 }
 
 /// Green-Lagrange strain `[E11, E22, E12]` of a deformation gradient.
-#[inline]
+#[inline(always)]
 fn green_strain(f: [f64; 4]) -> [f64; 3] {
     let [f11, f12, f21, f22] = f;
     [0.5 * (f11 * f11 + f21 * f21 - 1.0), 0.5 * (f12 * f12 + f22 * f22 - 1.0), 0.5 * (f11 * f12 + f21 * f22)]
@@ -201,34 +204,60 @@ pub fn linear_stiffness(points: &[GaussPoint; 4], material: &PlaneStrain) -> [f6
     stiffness
 }
 
-/// Cauchy stress `[s11, s22, s12]` (MPa) at each integration point.
-pub fn cauchy_stress(points: &[GaussPoint; 4], material: &PlaneStrain, u: &[f64; 16]) -> [[f64; 3]; 4] {
-    points.map(|point| {
-        let f = deformation_gradient(&point, u);
-        let s = material.stress(green_strain(f));
-        let j = f[0] * f[3] - f[1] * f[2];
-        // sigma = F S F^T / J
-        let fs = [
-            f[0] * s[0] + f[1] * s[2],
-            f[0] * s[2] + f[1] * s[1],
-            f[2] * s[0] + f[3] * s[2],
-            f[2] * s[2] + f[3] * s[1],
-        ];
-        [(fs[0] * f[0] + fs[1] * f[1]) / j, (fs[2] * f[2] + fs[3] * f[3]) / j, (fs[0] * f[2] + fs[1] * f[3]) / j]
-    })
+/// Cauchy stress `[s11, s22, s12]` (MPa) at each node of a mesh with nodal displacements `field` (x and y of each
+/// node): that of the integration points carried to the nodes of their element by the bilinear field through them,
+/// averaged over the elements that meet in a node.
+pub fn nodal_stress(
+    (elements, gauss): (&[[u32; 8]], &[[GaussPoint; 4]]),
+    material: &PlaneStrain,
+    field: &[f64],
+) -> Vec<[f64; 3]> {
+    // The fourth number counts the elements.
+    let mut sums = vec![[0.0; 4]; field.len() / 2];
+    Arch::new().dispatch(AddStress { elements, gauss, material, field, sums: &mut sums });
+    sums.into_iter().map(|[s11, s22, s12, count]| [s11 / count, s22 / count, s12 / count]).collect()
 }
 
-/// Values at the four integration points carried to the eight nodes by the bilinear field through them.
-pub fn extrapolate_to_nodes(values: &[f64; 4]) -> [f64; 8] {
+// Adds the stress of each element to that of its nodes, in the order of the elements.
+kernel!(AddStress {
+    elements: &'a [[u32; 8]], gauss: &'a [[GaussPoint; 4]], material: &'a PlaneStrain, field: &'a [f64],
+    sums: &'a mut [[f64; 4]]
+} -> (), |_simd| {
+    for (element, points) in elements.iter().zip(gauss) {
+        let u = std::array::from_fn(|i| field[2 * element[i / 2] as usize + i % 2]);
+        let at_points = [0, 1, 2, 3].map(|k| cauchy_stress(&points[k], material, &u));
+        for (n, stress) in element.iter().zip(extrapolate_to_nodes(&at_points)) {
+            sums[*n as usize].iter_mut().zip(stress).for_each(|(sum, s)| *sum += s);
+        }
+    }
+});
+
+/// Cauchy stress at an integration point.
+#[inline(always)]
+fn cauchy_stress(point: &GaussPoint, material: &PlaneStrain, u: &[f64; 16]) -> [f64; 3] {
+    let f = deformation_gradient(point, u);
+    let [s11, s22, s12] = material.stress(green_strain(f));
+    let j = f[0] * f[3] - f[1] * f[2];
+    // sigma = F S F^T / J
+    let fs = [f[0] * s11 + f[1] * s12, f[0] * s12 + f[1] * s22, f[2] * s11 + f[3] * s12, f[2] * s12 + f[3] * s22];
+    [(fs[0] * f[0] + fs[1] * f[1]) / j, (fs[2] * f[2] + fs[3] * f[3]) / j, (fs[0] * f[2] + fs[1] * f[3]) / j]
+}
+
+/// Values at the four integration points carried to the eight nodes by the bilinear field through them, and one.
+#[inline(always)]
+fn extrapolate_to_nodes(values: &[[f64; 3]; 4]) -> [[f64; 4]; 8] {
     let r = 3.0_f64.sqrt();
     let at = |[xi, eta]: [f64; 2]| {
-        0.25 * (values[0] * (1.0 - r * xi) * (1.0 - r * eta)
-            + values[1] * (1.0 + r * xi) * (1.0 - r * eta)
-            + values[2] * (1.0 + r * xi) * (1.0 + r * eta)
-            + values[3] * (1.0 - r * xi) * (1.0 + r * eta))
+        let of = |k: usize| {
+            0.25 * (values[0][k] * (1.0 - r * xi) * (1.0 - r * eta)
+                + values[1][k] * (1.0 + r * xi) * (1.0 - r * eta)
+                + values[2][k] * (1.0 + r * xi) * (1.0 + r * eta)
+                + values[3][k] * (1.0 - r * xi) * (1.0 + r * eta))
+        };
+        [of(0), of(1), of(2), 1.0]
     };
     // Corners, then the middles of the edges.
-    [[-1, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0]].map(|node| at(node.map(f64::from)))
+    [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]].map(at)
 }
 
 #[cfg(test)]

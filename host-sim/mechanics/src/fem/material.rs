@@ -21,6 +21,7 @@ impl PlaneStrain {
     }
 
     /// Second Piola-Kirchhoff stress `[S11, S22, S12]` (MPa) of the Green-Lagrange strain `[E11, E22, E12]`.
+    #[inline(always)]
     pub(crate) fn stress(&self, strain: [f64; 3]) -> [f64; 3] {
         let [e11, e22, e12] = strain;
         let pressure = self.lambda * (e11 + e22);
@@ -28,12 +29,14 @@ impl PlaneStrain {
     }
 
     /// Poisson's ratio.
+    #[inline]
     pub(crate) fn poissons_ratio(&self) -> f64 {
         self.lambda / (2.0 * (self.lambda + self.mu))
     }
 
     /// Von Mises stress (MPa) of the in-plane Cauchy stress `[s11, s22, s12]`; plane strain adds
     /// `s33 = nu (s11 + s22)`.
+    #[inline]
     pub fn von_mises(&self, cauchy: [f64; 3]) -> f64 {
         let [s11, s22, s12] = cauchy;
         let s33 = self.poissons_ratio() * (s11 + s22);

@@ -173,7 +173,8 @@ impl NearPairs {
             let mut pairs = Vec::new();
             let mut add = |pair, layout: &FlankLayout| {
                 let mut points = Vec::with_capacity(layout.points.len());
-                let across = flanks.gaps((pair, at), &layout.points, &mut |gap, rate, weight| {
+                // No turn within the reach moves a point by twice as much.
+                let across = flanks.gaps((pair, at), &layout.points, 2.0 * reach, &mut |gap, rate, weight| {
                     points.push(RigidPoint { gap, rate, weight });
                 });
                 pairs.push((across, points));

@@ -425,8 +425,8 @@ impl Problem {
     pub(super) fn seat(&self, v: &mut [f64]) {
         let outer = self.drive.circular_spline.outer_radius_mm;
         for (n, x) in self.circular_spline.nodes.iter().enumerate() {
-            let r = x[0].hypot(x[1]);
-            if r > outer - 1e-6 {
+            if x[0] * x[0] + x[1] * x[1] > (outer - 1e-6).powi(2) {
+                let r = x[0].hypot(x[1]);
                 let stretch = self.seat_displacement / r;
                 v[2 * n] = x[0] * stretch;
                 v[2 * n + 1] = x[1] * stretch;

@@ -1,6 +1,6 @@
 //! Out-of-balance forces, and the step that takes them away.
 
-use crate::fem::{dot, largest};
+use crate::{condense::dot, fem::largest};
 
 use super::slip::NodalField;
 use super::state::State;
