@@ -40,7 +40,7 @@ const CONTACT: &str = "what all sizes of a catalogue have in addition to teeth, 
 const S_TIP_ROUNDING: f64 = 0.1;
 
 /// Stiffness of the balls of a generator in proportion, N/mm³.
-fn balls_n_per_mm3(drive: &Drive) -> f64 {
+pub(super) fn balls_n_per_mm3(drive: &Drive) -> f64 {
     let pitch_mm = 2.0 * drive.flexspline.pitch_radius_mm();
     let bore_mm = 2.0 * drive.flexspline.bore_radius_mm();
     let load_n = BALL_N * (pitch_mm / BALL_N_AT_MM).powi(2);

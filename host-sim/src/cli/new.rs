@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::context::quoted;
-use super::made::{Clearance, as_sold, with_formulas, with_s_teeth};
+use super::made::{Clearance, as_sold, balls_n_per_mm3, with_formulas, with_s_teeth};
 use super::{Context, Failure, bad_input, say};
 use flexspline_base::output::write_whole;
 use flexspline_base::suggest::UnknownName;
@@ -436,7 +436,13 @@ fn run_under_load(
             }
             (under.tips_lowered_mm, under.tip_contact) = (relief.lowered_mm, relief.left);
         }
-        Err(error) => under.not_solved = Some(error.to_string()),
+        Err(error) => {
+            let (balls, proportion) = (drive.generator.bearing_stiffness_n_per_mm3, balls_n_per_mm3(&drive));
+            let field = "its balls are soft: generator.bearing_stiffness_n_per_mm3";
+            let soft = balls.filter(|balls| *balls < proportion);
+            let soft = soft.map(|balls| format!("; {field} is {balls}, in proportion it is {proportion}"));
+            under.not_solved = Some(error.to_string() + &soft.unwrap_or_default());
+        }
     }
     Ok(Some(under))
 }

@@ -4,10 +4,6 @@ use super::problem::SolverSettings;
 
 /// Layouts of the contact in one increment.
 const MOST_LAYOUTS: usize = 3;
-/// Iterations of one increment, all its parts and ways together, over those that Newton has before an increment is
-/// halved: so much work at most, whatever it leads to. A guess, far above what increments that converge take.
-const MOST_WORK: usize = 100;
-
 /// Iterations of one increment, all its parts and ways together.
 pub(super) struct WorkLimit {
     done: usize,
@@ -16,7 +12,7 @@ pub(super) struct WorkLimit {
 
 impl WorkLimit {
     pub fn new(settings: &SolverSettings) -> WorkLimit {
-        WorkLimit { done: 0, most: MOST_WORK * settings.max_iterations }
+        WorkLimit { done: 0, most: settings.max_work }
     }
 
     pub(crate) fn is_left(&self) -> bool {

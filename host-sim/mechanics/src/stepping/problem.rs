@@ -90,6 +90,9 @@ pub struct SolverSettings {
     pub max_iterations: usize,
     /// Halvings of an increment before giving up.
     pub max_halvings: usize,
+    /// Newton iterations of one increment, all its parts and ways together, before giving up; by default far more than
+    /// increments that converge take (a guess).
+    pub max_work: usize,
 }
 
 impl SolverSettings {
@@ -117,6 +120,7 @@ impl Default for SolverSettings {
             tolerance: 1e-6,
             max_iterations: 60,
             max_halvings: 8,
+            max_work: 6000,
         }
     }
 }
