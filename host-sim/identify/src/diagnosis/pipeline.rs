@@ -302,7 +302,7 @@ pub fn parse_rows(
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
     if recording.unusable.is_none() {
         channels::take_friction(&mut recording, &mut subject.nominal, subject.table.as_ref());
-        // The zero is where the output changes its flank, if something else than these rows says how friction shifts it.
+        // The zero is where the output changes its flank, if it is known from elsewhere how friction shifts that.
         let (nominal, table) = subject.against();
         if table.is_some() || nominal.friction_torque_n_m > 0.0 && subject.note.is_none() {
             channels::check_zero(&mut recording, nominal, table);
