@@ -283,7 +283,7 @@ impl<'m> Pressed<'m> {
             history = self.flanks.friction_history((PAIR, at), law, &points);
             let mut sticks = [0.0; 2];
             let mut tractions = history.iter();
-            self.flanks.gaps((PAIR, at), &points, &mut |gap, _, weight| {
+            self.flanks.gaps((PAIR, at), &points, f64::INFINITY, &mut |gap, _, weight| {
                 let limit = -friction * PENALTY * gap;
                 let traction = tractions.next().map_or(0.0, |(_, traction)| traction.abs());
                 if limit > 0.0 {

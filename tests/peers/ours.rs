@@ -69,6 +69,7 @@ pub fn stress(problem: &Problem, state: &State, element: usize) -> [[f64; 3]; 4]
     for (a, &n) in problem.flexspline.elements[element].iter().enumerate() {
         [u[2 * a], u[2 * a + 1]] = displacement(state, n as usize);
     }
-    let [a, b, c, d] = cauchy_stress(&problem.flexspline.gauss[element], &problem.material, &u);
+    let stress = |point| cauchy_stress(point, &problem.material, &u);
+    let [a, b, c, d] = problem.flexspline.gauss[element].each_ref().map(stress);
     [a, b, d, c]
 }

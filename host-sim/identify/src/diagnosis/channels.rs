@@ -463,8 +463,8 @@ pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, ta
         let known =
             if stated > 0.0 { format!("the model states a friction of {stated:.2}") } else { "none is known".into() };
         recording.notes.push(format!(
-            "the output changes its flank at a load of about {n_m:.2} N·m, the friction of its play, where {known}: with \
-             that {:.0} % less is left, and it takes its place",
+            "the output changes its flank at a load of about {n_m:.2} N·m, the friction of its play, where {known}: \
+             with that {:.0} % less is left, and it takes its place",
             100.0 * (1.0 - left)
         ));
         nominal.friction_torque_n_m = *n_m;

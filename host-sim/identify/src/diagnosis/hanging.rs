@@ -52,8 +52,8 @@ struct MayHang {
     side: f64,
 }
 
-/// Rows of a session from a change of the load's side on until it has been so large, or so long, that it must have moved
-/// the output.
+/// Rows of a session from a change of the load's side on until it has been so large, or so long, that it must have
+/// moved the output.
 fn may_hang(rows: &Rows, session: &Range<usize>, friction_n_m: f64) -> Vec<MayHang> {
     let mut events: Vec<MayHang> = Vec::new();
     // The load's side, and since when it has been there while the output may still be on the other.

@@ -631,7 +631,7 @@ impl<'a> FlankContact<'a> {
     /// Gap of the integration points where the face is nearest, how it changes as the output alone turns (mm/rad), and
     /// their weight; with the offsets along the face, where there are any. Points that a glance finds further apart
     /// than `within_mm` are left out.
-    pub(crate) fn gaps(
+    pub fn gaps(
         &self,
         (pair, at): PairAt<'_>,
         points: &[FlankPoint],

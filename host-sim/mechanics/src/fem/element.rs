@@ -232,9 +232,9 @@ kernel!(AddStress {
     }
 });
 
-/// Cauchy stress at an integration point.
+/// Cauchy stress `[s11, s22, s12]` (MPa) at an integration point.
 #[inline(always)]
-fn cauchy_stress(point: &GaussPoint, material: &PlaneStrain, u: &[f64; 16]) -> [f64; 3] {
+pub fn cauchy_stress(point: &GaussPoint, material: &PlaneStrain, u: &[f64; 16]) -> [f64; 3] {
     let f = deformation_gradient(point, u);
     let [s11, s22, s12] = material.stress(green_strain(f));
     let j = f[0] * f[3] - f[1] * f[2];
