@@ -834,14 +834,13 @@ fn with_faults(error: CalibrationError, files: &[Recording], said: &[String]) ->
 /// Load below which the direction decides the flank without a table, N·m: that of the prior, or of those tried the one
 /// beside which all parts together leave least in rows left out.
 fn friction_of(rows: &Rows, prior: &Prior<'_>, recorded: &Recorded) -> f64 {
-    let usual = recorded.scales.friction_n_m;
-    if prior.friction_n_m() > 0.0 {
+    let (usual, parts) = (recorded.scales.friction_n_m, recorded.shown(PartName::ALL, prior));
+    if prior.friction_n_m() > 0.0 || [PartName::WindUp, PartName::Play].iter().any(|part| !parts.contains(part)) {
         return usual;
     }
     let every = rows.rows.len().div_ceil(FRICTION_WITH).max(1);
     let mut some = rows.clone().less(prior);
     some.rows = some.rows.into_iter().step_by(every).collect();
-    let parts = recorded.shown(PartName::ALL, prior);
     let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[1] }).collect();
     let left = |friction_n_m: f64| {
         let folds = some.folds_of(&parts, &Scales { friction_n_m, ..recorded.scales });
