@@ -72,6 +72,8 @@ const LEAST_FRICTION: f64 = 0.02;
 /// Frictions that are tried where none is known, of that: from 1 to 20 % of the largest load. *Source*: what starts a
 /// drive of the catalogue (CSG-14 to 25, 100), through the ratio, is 7 to 21 % of its rated torque.
 const FRICTIONS: [f64; 10] = [0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 10.0];
+/// And to either side of the best of them: half a step of these, of which each is about 1.4 times the one before.
+const HALF_A_STEP: [f64; 2] = [0.84, 1.19];
 /// Rows that tell a friction, about. *Guess*: hundreds of them lie at loads around it.
 const FRICTION_WITH: usize = 6000;
 /// Rows between two dead zones tell them apart if their load is clear of both by this multiple of the torque's noise…
@@ -838,9 +840,8 @@ fn friction_of(rows: &Rows, prior: &Prior<'_>, recorded: &Recorded) -> f64 {
     if prior.friction_n_m() > 0.0 || [PartName::WindUp, PartName::Play].iter().any(|part| !parts.contains(part)) {
         return usual;
     }
-    let every = rows.rows.len().div_ceil(FRICTION_WITH).max(1);
     let mut some = rows.clone().less(prior);
-    some.rows = some.rows.into_iter().step_by(every).collect();
+    some.rows = zero::thinned(some.rows.iter(), FRICTION_WITH).into_iter().copied().collect();
     let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[1] }).collect();
     let left = |friction_n_m: f64| {
         let folds = some.folds_of(&parts, &Scales { friction_n_m, ..recorded.scales });
@@ -850,7 +851,11 @@ fn friction_of(rows: &Rows, prior: &Prior<'_>, recorded: &Recorded) -> f64 {
     let tried = FRICTIONS.map(|times| left(times * usual));
     let best = least(&tried);
     // At the end of them something else goes on as far as one lets it: a load that was not recorded.
-    if best < tried[tried.len() - 1].0 { least(&[0.84, 1.0, 1.19].map(|times| left(times * best))) } else { usual }
+    if best >= tried[tried.len() - 1].0 {
+        return usual;
+    }
+    let [below, above] = HALF_A_STEP.map(|times| left(times * best));
+    least(&[&[below], &tried[..], &[above]].concat())
 }
 
 /// Load below which the direction decides the flank beside a table, N·m: its own dead zone, unless rows with loads

@@ -416,6 +416,20 @@ impl Fit {
     }
 }
 
+/// Places of the columns that are no main one of their term, and one of another.
+fn owned_by_others(terms: &[&White], starts: &[usize], gram: &Gram) -> Vec<usize> {
+    let columns = || {
+        terms.iter().zip(starts).enumerate().flat_map(|(term, (white, start))| {
+            let of = white.tolerances.iter().zip(*start..);
+            of.map(move |(of, at)| (term, at, matches!(of, Tolerance::Main(_))))
+        })
+    };
+    let is_one = |a: usize, b: usize| gram.at(a.max(b), a.min(b)).powi(2) > SAME * gram.at(a, a) * gram.at(b, b);
+    let owned =
+        |(term, at): (usize, usize)| columns().any(|(other, own, main)| main && other != term && is_one(at, own));
+    columns().filter(|(term, at, main)| !main && owned((*term, *at))).map(|(_, at, _)| at).collect()
+}
+
 impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Of the base and some terms.
     #[must_use]
@@ -501,24 +515,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             starts.push(at);
             at += term.len();
         }
-        // Columns of the terms: which term's, where, whether a main one.
-        let columns: Vec<(usize, usize, bool)> = (0..all.len())
-            .flat_map(|term| {
-                let of = all[term].tolerances.iter().zip(starts[term]..);
-                of.map(move |(of, at)| (term, at, matches!(of, Tolerance::Main(_))))
-            })
-            .collect();
-        let is_one = |a: usize, b: usize| {
-            let [both, a, b] = [(a.max(b), a.min(b)), (a, a), (b, b)].map(|(i, j)| gram.at(i, j));
-            both * both > SAME * a * b
-        };
-        let owned: Vec<usize> = columns
-            .iter()
-            .filter(|(term, at, main)| {
-                !main && columns.iter().any(|(other, own, main)| *main && other != term && is_one(*at, *own))
-            })
-            .map(|(_, at, _)| *at)
-            .collect();
+        let owned = owned_by_others(&all, &starts, &gram);
         let mut last: Option<(Solution, Vec<Prior>)> = None;
         for round in 0..ROUNDS {
             let mut priors = problem.base_priors();

@@ -1270,7 +1270,6 @@ fn at_one_speed_and_load_nothing_makes_a_load_swing() {
     }
 }
 
-/// Beside an eccentric disc the tilt of it is no overtone.
 #[test]
 fn two_orders_of_an_encoder_have_an_owner_each() {
     let effects = [
@@ -1280,8 +1279,7 @@ fn two_orders_of_an_encoder_have_an_owner_each() {
     let found = diagnosed(&effects, 31);
     assert_eq!(names(&found), [CauseName::OutputEncoderEccentricity, CauseName::OutputEncoderTilt], "{}", found.text());
     let tilt = found.causes.iter().find(|cause| cause.name == CauseName::OutputEncoderTilt).unwrap();
-    let amplitude = tilt.parameters["amplitude_arcsec"];
-    assert!((amplitude.value - 80.0).abs() < 1.5, "{}", found.text());
+    assert!((tilt.parameters["amplitude_arcsec"].value - 80.0).abs() < 1.5, "{}", found.text());
 }
 
 #[test]
