@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use flexspline::Table;
+use flexspline::{Approach, Direction, OutputAngle, PlayState, Table};
 use flexspline_base::statistics::std_dev;
 use flexspline_identify::calibrate::{Calibration, Prior, calibrate};
 use flexspline_identify::extension::left_by_core;
@@ -172,6 +172,33 @@ fn a_motor_zero_that_is_off_by_whole_turns_is_put_right_where_the_output_says_it
     desk.write("other.csv", &log_of(101.0, 0.0, 0.0, 0.0));
     let said = desk.line("replay --tables out/calibrated.fxt other.csv --out again").done().stdout;
     assert!(said.contains("the table is worse than none here"), "{said}");
+}
+
+/// A motor encoder with an eccentric read head, by a quarter of a radian: the output departs from following it by as
+/// much. There is a table, and its inverse finds every target.
+#[test]
+fn a_steep_wave_has_its_table_and_its_inverse() {
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut text = "generator_rad,output_rad\n".to_owned();
+    for k in 0..12_000 {
+        let psi = TAU * 100.0 * f64::from(if k < 6000 { k } else { 12_000 - k }) / 6000.3;
+        let noise = 2.0 * (random.f64() - 0.5) * TAU / 1_296_000.0;
+        text += &format!("{:.8},{:.10}\n", psi - 0.25 * (psi + 0.7).sin(), psi / 100.0 + noise);
+    }
+    let map = ColumnMap::parse("generator=generator_rad:rad,output=output_rad:rad").unwrap();
+    let log = parse("steep.csv", text.into_bytes(), &map, &Gear::of_ratio(100.0)).unwrap();
+    let made = calibrate(&[log], &Prior::of_ratio(100.0, GeneratorKind::Cam)).unwrap();
+    let left_arcsec = made.calibration.held_out.rms_after_arcsec;
+    let table = Table::check(&made.table.image).unwrap();
+    println!("{left_arcsec:.2} arcsec left, {} iterations", table.inverse_iterations());
+    assert!(left_arcsec < 2.0 && table.inverse_iterations() > 8);
+    for target in (0..2000).map(|k| OutputAngle::from_rad(f64::from(k) * 0.0041).unwrap()) {
+        let command = table.inverse(target, 0.0, 20.0, Approach::Moving(Direction::Forward));
+        let mut state = PlayState::after_motion(Direction::Forward);
+        let there = table.forward(&mut state, command.generator, 0.0, 20.0);
+        let off_rad = there.output.minus_rad(target).abs();
+        assert!(off_rad <= table.inverse_error_bound_rad() + 5e-9, "{off_rad} rad off");
+    }
 }
 
 /// Value and standard deviation of the zero of each log but the first, deg, by its name.

@@ -45,7 +45,8 @@ enum {
     LEAST_PERIODIC_NODES = 4,
     MOST_PERIODIC_NODES = 128,
     NODE_WORDS = 3,
-    MOST_ITERATIONS = 8,
+    USUAL_ITERATIONS = 8,
+    MOST_ITERATIONS = 24,
     HOLD_COUNTS = 8
 };
 /* Where things are, in words. */
@@ -1351,29 +1352,40 @@ static bool check_curve(check *is, uint32_t index)
     return true;
 }
 
-/* Iterations of the inverse and what they leave; the words that say so. */
-static bool check_inverse(check *is)
+/* What at most `most` iterations of the inverse and rounding leave, and how many they are, where a step in the curves
+   moves the solution by no more than its own over `steepness`. */
+static float iterated(const check *is, uint32_t most, float steepness, uint32_t *iterations)
 {
-    fxt_table *table = is->table;
-    const float cell_rad = is->ripple_nodes == 0u ? float_of(0x7f800000u) : rad_of(magnitude(table->cell_width));
-    const float rate = is->curve_slope / (1.0f - is->slope);
+    const float cell_rad =
+        is->ripple_nodes == 0u ? float_of(0x7f800000u) : rad_of(magnitude(is->table->cell_width));
+    const float rate = is->curve_slope / steepness;
     float left = is->periodic_rad, away = is->cells * cell_rad + is->periodic_rad * rate;
-    uint32_t iterations = 0;
-    while (iterations < (uint32_t)MOST_ITERATIONS) {
+    *iterations = 0;
+    while (*iterations < most) {
         const float beyond = larger(away - cell_rad, 0.0f);
         left = left * rate + beyond;
         away = left * (1.0f + rate);
-        iterations++;
+        (*iterations)++;
         if (left <= 1.0e-7f) {
             break;
         }
     }
     const float place = is_finite(cell_rad) ? 4.0f * FLT_EPSILON * cell_rad : 0.0f;
-    left = left + (is->rounding_rad + place) / (1.0f - is->slope);
+    return left + (is->rounding_rad + place) / (1.0f - is->slope);
+}
+
+/* Iterations of the inverse and what they leave; the words that say so. */
+static bool check_inverse(check *is)
+{
+    uint32_t iterations;
+    float left = iterated(is, USUAL_ITERATIONS, 1.0f - is->slope, &iterations);
+    if (!(left <= 1.0e-6f)) {
+        left = iterated(is, MOST_ITERATIONS, 1.0f - (is->slope - is->curve_slope), &iterations);
+    }
     if (!(left <= 1.0e-6f)) {
         return refuse(is, FXT_INVERSE, FXT_NO_FIELD, 0, 0);
     }
-    table->inverse_error_rad = left;
+    is->table->inverse_error_rad = left;
     const double left_counts = counts_of_rad((double)number_within(left, 0.0f, 1.0e-6f));
     const uint32_t hold = to_u32(left_counts) + (uint32_t)HOLD_COUNTS;
     return derived_is(is, AT_ITERATIONS, iterations) && derived_is(is, AT_HOLD, hold);

@@ -13,10 +13,11 @@
 //! so the signs at the boundaries show in which cell the solution lies, and the root of its parabola is the solution,
 //! exactly.
 //!
-//! The remaining error comes from A, B, C, with the slope bound `Lc`: `|eₖ₊₁ − e| ≤ Lc/(1 − L)·|eₖ − e|`. A ripple so
-//! large that the solution can lie beyond the three cells takes further iterations; each brings it a cell nearer at
-//! least. How many are needed is found from the coefficients, stands in the image and is found again when the table is
-//! accepted: one, without A, B, C and with a ripple below a cell.
+//! The remaining error comes from A, B, C, with the slope bound `Lc`: `|eₖ₊₁ − e| ≤ Lc/(1 − (L − Lc))·|eₖ − e|`, as the
+//! ripple takes part in each solution; `Lc/(1 − L)`, which is more, counts where eight iterations do even so. A ripple
+//! so large that the solution can lie beyond the three cells takes further iterations; each brings it a cell nearer at
+//! least. How many are needed, 24 at most, is found from the coefficients, stands in the image and is found again when
+//! the table is accepted: one, without A, B, C and with a ripple below a cell.
 
 use super::memory::{Doubt, Memory, PointPlan};
 use super::point::{OperatingPoint, Quality};
