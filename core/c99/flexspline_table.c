@@ -1352,19 +1352,17 @@ static bool check_curve(check *is, uint32_t index)
     return true;
 }
 
-/* What at most `most` iterations of the inverse and rounding leave, and how many they are, where a step in the curves
-   moves the solution by no more than its own over `steepness`. */
-static float iterated(const check *is, uint32_t most, float steepness, uint32_t *iterations)
+/* What at most `most` iterations of the inverse and rounding leave, and how many they are; as in the core. */
+static float iterated(const check *is, uint32_t most, float rate, const float away_by[3], uint32_t *iterations)
 {
     const float cell_rad =
         is->ripple_nodes == 0u ? float_of(0x7f800000u) : rad_of(magnitude(is->table->cell_width));
-    const float rate = is->curve_slope / steepness;
-    float left = is->periodic_rad, away = is->cells * cell_rad + is->periodic_rad * rate;
+    float left = is->periodic_rad, away = is->cells * cell_rad + away_by[0];
     *iterations = 0;
     while (*iterations < most) {
         const float beyond = larger(away - cell_rad, 0.0f);
         left = left * rate + beyond;
-        away = left * (1.0f + rate);
+        away = left * away_by[1] + beyond * away_by[2];
         (*iterations)++;
         if (left <= 1.0e-7f) {
             break;
@@ -1378,9 +1376,13 @@ static float iterated(const check *is, uint32_t most, float steepness, uint32_t 
 static bool check_inverse(check *is)
 {
     uint32_t iterations;
-    float left = iterated(is, USUAL_ITERATIONS, 1.0f - is->slope, &iterations);
+    const float rough = is->curve_slope / (1.0f - is->slope);
+    const float usual[3] = {is->periodic_rad * rough, 1.0f + rough, 0.0f};
+    float left = iterated(is, USUAL_ITERATIONS, rough, usual, &iterations);
     if (!(left <= 1.0e-6f)) {
-        left = iterated(is, MOST_ITERATIONS, 1.0f - (is->slope - is->curve_slope), &iterations);
+        const float ripple = is->slope - is->curve_slope, rate = is->curve_slope / (1.0f - ripple);
+        const float steep[3] = {0.0f, ripple * (1.0f + rate), 1.0f + ripple};
+        left = iterated(is, MOST_ITERATIONS, rate, steep, &iterations);
     }
     if (!(left <= 1.0e-6f)) {
         return refuse(is, FXT_INVERSE, FXT_NO_FIELD, 0, 0);

@@ -54,24 +54,28 @@ impl Bounds {
     /// Iterations that an inverse takes, 1 to 24, and what they and rounding leave; `cell_rad` is a cell of the ripple at
     /// the output.
     pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
-        let usual = self.iterated(USUAL_ITERATIONS, 1.0 - self.slope, cell_rad);
+        let rough = self.curve_slope / (1.0 - self.slope);
+        let usual = self.iterated(USUAL_ITERATIONS, rough, [self.periodic_rad * rough, 1.0 + rough, 0.0], cell_rad);
         if usual.error_rad <= MAX_INVERSE_ERROR_RAD {
             return usual;
         }
-        self.iterated(MAX_INVERSE_ITERATIONS, 1.0 - (self.slope - self.curve_slope), cell_rad)
+        let ripple = self.slope - self.curve_slope;
+        let rate = self.curve_slope / (1.0 - ripple);
+        self.iterated(MAX_INVERSE_ITERATIONS, rate, [0.0, ripple * (1.0 + rate), 1.0 + ripple], cell_rad)
     }
 
-    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], or `most` of them, where a step in A, B, C moves
-    /// the solution by no more than its own over `steepness`.
-    fn iterated(self, most: u8, steepness: f32, cell_rad: f32) -> InverseBound {
-        let rate = self.curve_slope / steepness;
+    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], or `most` of them, each to `rate` of the error
+    /// before it. The solution for A, B, C held fixed is off the place where it is looked for by no more than the
+    /// ripple and the first of `away` at first, then by these multiples of the error and of what the last search fell
+    /// short.
+    fn iterated(self, most: u8, rate: f32, away: [f32; 3], cell_rad: f32) -> InverseBound {
+        let [first_rad, of_error, of_short] = away;
         let mut bound = InverseBound { iterations: 0, error_rad: self.periodic_rad };
-        // How far the solution for A, B, C held fixed can be.
-        let mut away_rad = self.ripple_cells * cell_rad + self.periodic_rad * rate;
+        let mut away_rad = self.ripple_cells * cell_rad + first_rad;
         while bound.iterations < most {
             let short_rad = larger(away_rad - cell_rad, 0.0);
             bound.error_rad = bound.error_rad * rate + short_rad;
-            away_rad = bound.error_rad * (1.0 + rate);
+            away_rad = bound.error_rad * of_error + short_rad * of_short;
             bound.iterations = bound.iterations.saturating_add(1);
             if bound.error_rad <= INVERSE_TOLERANCE_RAD {
                 break;
