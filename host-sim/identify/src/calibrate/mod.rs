@@ -500,14 +500,14 @@ fn calibrated<T>(
     let by_a_load_rad = if files.len() > 1 { LEAST_OF_OTHER_RATIO_RAD } else { 0.0 };
     let said = files.iter().map(|file| check_ratio_of(file, prior.nominal.ratio, by_a_load_rad));
     let mut said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-    let parted = files.iter().flat_map(|file| by_zeros(file, |session| session.own_zero));
-    let mut files: Vec<Recording> = parted.collect();
+    let mut files = in_pieces(files);
     if let Some(anew) = set_anew(&files, prior) {
-        // Sessions before a lost index and behind it have other zeros, too.
+        // Sessions before a lost index and behind it have other zeros, too: without it they have one.
         let recorded = Recorded::of(&files, prior);
         let rows = settled(&files, prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
         let plain = fit(rows, prior, &recorded, &[]);
-        if let Some(parted) = at_lost_index(given, &files, &plain, prior) {
+        let parted = at_lost_index(given, &files, &plain, prior);
+        if let Some(parted) = parted.filter(|parted| set_anew(&in_pieces(parted), prior).is_none()) {
             return calibrated(&parted, known, say);
         }
         files = anew;
@@ -567,6 +567,11 @@ fn by_zeros(file: &Recording, begins: impl Fn(&Session) -> bool) -> Vec<Recordin
     pieces
 }
 
+/// Logs in pieces of one zero each, as far as it is known where another begins.
+fn in_pieces(files: &[Recording]) -> Vec<Recording> {
+    files.iter().flat_map(|file| by_zeros(file, |session| session.own_zero)).collect()
+}
+
 /// The logs `given` with another zero from where an encoder lost its index, in what a fit leaves of `files`, made of
 /// them; none where it lost none, or there is no fit.
 fn at_lost_index(
@@ -615,7 +620,10 @@ fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<Vec<Recording>> {
         return None;
     }
     let rows = settled(&anew, prior, &recorded);
-    let long = (0..anew.len()).all(|log| rows.rows.iter().filter(|row| row.at.log == log).count() >= FEWEST_ROWS);
+    let counts = (0..anew.len()).map(|log| rows.rows.iter().filter(|row| row.at.log == log).count());
+    // One that a lost index cuts short is no reason against the others.
+    let in_short: usize = counts.filter(|count| *count < FEWEST_ROWS).sum();
+    let long = in_short as f64 <= BOTH_WAYS * rows.rows.len() as f64;
     let left = |rows: &Rows| zero::left_beside_load(rows, recorded.scales.friction_n_m);
     (long && left(&rows) < LEAVES * left(&settled(files, prior, &recorded))).then_some(anew)
 }
@@ -654,7 +662,7 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
     log.sessions = sessions;
     // Behind a lost index the output has another zero.
     for _ in 0..MOST_LOST {
-        let files: Vec<Recording> = by_zeros(&log, |session| session.own_zero);
+        let files = in_pieces(std::slice::from_ref(&log));
         let recorded = Recorded::of(&files, &prior);
         let rows = settled(&files, &prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
         let none = Model { chosen: Vec::new(), coefficients: Vec::new(), scales: recorded.scales };
