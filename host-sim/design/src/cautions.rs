@@ -49,8 +49,8 @@ const BEYOND_STEEL: f64 = 3.0;
 /// three to five times the rated torque.
 const MOST_OF_RATED: f64 = 5.0;
 
-/// Ratios at which catalogues bear out FEM, cup, balls and [`Drive::CATALOGUE_CONTACT`] within 19 %: measured at 50, 80
-/// and 100. At 160 K1 is up to 28 % too stiff; on a line from the 11 % of 100 it leaves these 19 % at 130.
+/// Ratios at which catalogues bear out FEM, cup, balls and [`Drive::CATALOGUE_CONTACT`] within 19 %: measured at 50, 80,
+/// 100 and 120. At 160 K1 is up to 28 % too stiff; on a line from the 17 % of 120 it leaves these 19 % near 130.
 const BORNE_OUT_RATIOS: [f64; 2] = [50.0, 130.0];
 /// Pitch diameter of the least size that they bear out, 17, mm, less rounding.
 const LEAST_BORNE_OUT_MM: f64 = 43.0;
