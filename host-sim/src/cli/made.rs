@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Context, Failure, bad_input};
@@ -125,18 +124,11 @@ pub(super) struct Clearance {
 
 impl Clearance {
     pub(super) fn of(drive: &Drive) -> Result<Clearance, DriveError> {
-        let each: Vec<(GeneratorKind, Option<f64>)> = GeneratorKind::ALL
-            .into_par_iter()
-            .map(|kind| {
-                let report = RigidMesh::new(drive, kind)?.report(kind);
-                let binds = report.filter(|report| !report.interferences.is_empty());
-                Ok((kind, binds.map(|report| -1e3 * report.least.gap_mm)))
-            })
-            .collect::<Result<_, DriveError>>()?;
-        Ok(Clearance {
-            clear: each.iter().filter(|(_, binds)| binds.is_none()).map(|(kind, _)| *kind).collect(),
-            interfere_um: each.into_iter().filter_map(|(kind, binds)| Some((kind, binds?))).collect(),
-        })
+        let interfering = RigidMesh::interfering(drive)?;
+        let interfere_um: BTreeMap<_, _> =
+            interfering.into_iter().map(|(kind, least)| (kind, -1e3 * least.gap_mm)).collect();
+        let clear = GeneratorKind::ALL.into_iter().filter(|kind| !interfere_um.contains_key(kind)).collect();
+        Ok(Clearance { clear, interfere_um })
     }
 
     /// In words.

@@ -160,22 +160,16 @@ impl FewNumbers {
     /// # Errors
     /// There is none.
     pub fn shift(&self, drive: &Drive) -> Result<f64, DriveError> {
-        let report = |shift: f64, kind| {
+        let with = |shift: f64| {
             let mut drive = drive.clone();
             drive.circular_spline.profile_shift = shift;
-            drive.check()?;
-            let report = RigidMesh::new(&drive, kind)?.report(kind);
-            report.ok_or_else(|| DriveError::from(Problem::of("teeth", "the teeth never meet")))
+            drive.check().map(|()| drive)
         };
-        let has_play = |shift| Ok(report(shift, self.generator)?.backlash_rad >= BACKLASH_RAD);
-        let clears = |shift| {
-            for kind in GeneratorKind::ALL {
-                if !report(shift, kind)?.interferences.is_empty() {
-                    return Ok(false);
-                }
-            }
-            Ok(true)
+        let has_play = |shift| {
+            let (backlash_rad, _) = RigidMesh::new(&with(shift)?, self.generator)?.room();
+            Ok((BACKLASH_RAD..f64::INFINITY).contains(&backlash_rad))
         };
+        let clears = |shift| Ok(RigidMesh::interfering(&with(shift)?)?.is_empty());
         let [low, high] = SHIFTS;
         let shift = least(low, high, &has_play)?;
         let shift = if clears(shift)? { shift } else { least(shift, high, &clears)? };

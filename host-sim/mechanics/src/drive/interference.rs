@@ -20,6 +20,7 @@ use super::placement::{FlankDeviations, rotate};
 use super::ring::GeneratorKind;
 use super::spec::Drive;
 use super::tooth::{OutlinePiece, PieceKind, ToothFlank};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt;
@@ -122,6 +123,8 @@ struct LeastGap {
 #[derive(Debug, Clone)]
 pub struct RigidMesh {
     tooth: ToothFlank,
+    /// Points that are tried on its pieces from the root fillet on.
+    tried: Vec<[[f64; 2]; PIECE_STEPS + 1]>,
     space: ToothFlank,
     curve: NeutralCurve,
     flexspline_teeth: f64,
@@ -157,8 +160,11 @@ impl RigidMesh {
     pub fn new(drive: &Drive, kind: GeneratorKind) -> Result<Self, DriveError> {
         let mut warm = drive.generator.clone();
         warm.w0_mm *= drive.thermal_state.flexspline_scale;
+        let tooth = ToothFlank::external(drive)?;
+        let points = |piece: &OutlinePiece| std::array::from_fn(|k| piece.point(k as f64 / PIECE_STEPS as f64));
         Ok(RigidMesh {
-            tooth: ToothFlank::external(drive)?,
+            tried: tooth.pieces()[1..].iter().map(points).collect(),
+            tooth,
             space: ToothFlank::internal(drive)?,
             curve: NeutralCurve::new(warm.shape(kind), drive.flexspline.neutral_radius_mm()),
             flexspline_teeth: f64::from(drive.flexspline.teeth),
@@ -177,8 +183,8 @@ impl RigidMesh {
         let sign = side.sign();
         let (_, space_tip) = self.space.root_and_tip_radius();
 
-        let gap_at = |piece: &OutlinePiece, t: f64| -> Option<FlankGap> {
-            let [px, py] = piece.point(t);
+        // Radius and gap (rad) at a point of the tooth; none inside the tips of the circular spline.
+        let gap_at = |[px, py]: [f64; 2]| -> Option<[f64; 2]> {
             let (along, across) = (px - self.curve.radius_mm(), sign * py);
             let place = [foot[0] + along * c - across * s, foot[1] + along * s + across * c];
             let radius = place[0].hypot(place[1]);
@@ -187,33 +193,34 @@ impl RigidMesh {
             }
             // beyond the root circle there is no space left
             let half_space = self.space.angle_at_radius(radius).unwrap_or(0.0);
-            let gap_rad = half_space - sign * place[1].atan2(place[0]);
-            Some(FlankGap {
-                gap_mm: gap_rad * radius,
-                gap_rad,
-                material_angle_rad: phi,
-                side,
-                flexspline_radius_mm: px.hypot(py),
-                flexspline_piece: piece.kind,
-                circular_spline_radius_mm: radius,
-            })
+            Some([radius, half_space - sign * place[1].atan2(place[0])])
         };
-        let lesser = |a: Option<FlankGap>, b: Option<FlankGap>| match (a, b) {
-            (Some(a), Some(b)) => Some(if b.gap_rad < a.gap_rad { b } else { a }),
-            (a, b) => a.or(b),
-        };
-        let value = |gap: &Option<FlankGap>| gap.map_or(f64::INFINITY, |gap| gap.gap_rad);
+        let value = |gap: &Option<[f64; 2]>| gap.map_or(f64::INFINITY, |[_, gap_rad]| gap_rad);
 
-        let mut best = None;
-        for piece in &self.tooth.pieces()[1..] {
-            let at = |k: usize| k as f64 / PIECE_STEPS as f64;
-            let tried: Vec<Option<FlankGap>> = (0..=PIECE_STEPS).map(|k| gap_at(piece, at(k))).collect();
+        let mut best: Option<FlankGap> = None;
+        for (piece, points) in self.tooth.pieces()[1..].iter().zip(&self.tried) {
+            let tried = points.map(gap_at);
             let least = (0..=PIECE_STEPS).min_by(|&i, &j| value(&tried[i]).total_cmp(&value(&tried[j])));
             let Some(k) = least.filter(|&k| tried[k].is_some()) else {
                 continue;
             };
-            let refined = golden(|t| value(&gap_at(piece, t)), at(k.saturating_sub(1)), at((k + 1).min(PIECE_STEPS)));
-            best = lesser(best, lesser(tried[k], gap_at(piece, refined)));
+            let at = |k: usize| k as f64 / PIECE_STEPS as f64;
+            let (low, high) = (at(k.saturating_sub(1)), at((k + 1).min(PIECE_STEPS)));
+            let refined = piece.point(golden(|t| value(&gap_at(piece.point(t))), low, high));
+            for (point, gap) in [(points[k], tried[k]), (refined, gap_at(refined))] {
+                let Some([radius, gap_rad]) = gap.filter(|[_, gap]| best.is_none_or(|best| *gap < best.gap_rad)) else {
+                    continue;
+                };
+                best = Some(FlankGap {
+                    gap_mm: gap_rad * radius,
+                    gap_rad,
+                    material_angle_rad: phi,
+                    side,
+                    flexspline_radius_mm: point[0].hypot(point[1]),
+                    flexspline_piece: piece.kind,
+                    circular_spline_radius_mm: radius,
+                });
+            }
         }
         best
     }
@@ -223,6 +230,18 @@ impl RigidMesh {
         let (least, interferences) = self.scan()?;
         let (backlash_rad, ripple_rad) = self.room();
         Some(MeshReport { generator, least, backlash_rad, ripple_rad, interferences })
+    }
+
+    /// Generators under which the teeth of a drive interfere, and the least gap there.
+    ///
+    /// # Errors
+    /// An outline that cannot be drawn.
+    pub fn interfering(drive: &Drive) -> Result<Vec<(GeneratorKind, FlankGap)>, DriveError> {
+        let of = |kind| {
+            let found = RigidMesh::new(drive, kind)?.scan();
+            Ok(found.filter(|(_, interferences)| !interferences.is_empty()).map(|(least, _)| (kind, least)))
+        };
+        GeneratorKind::ALL.into_par_iter().filter_map(|kind| of(kind).transpose()).collect()
     }
 
     /// The least gap over the cycle, and the worst point of every stretch that interferes.
@@ -257,20 +276,19 @@ impl RigidMesh {
         Some((least?, interferences))
     }
 
-    /// Backlash and ripple: one pitch of generator angle, all teeth that can touch.
-    fn room(&self) -> (f64, f64) {
+    /// Backlash and ripple, rad: one pitch of generator angle, all teeth that can touch.
+    pub(super) fn room(&self) -> (f64, f64) {
         let pitch = TAU / self.flexspline_teeth;
         let within = (FRAC_PI_2 / pitch) as i32;
-        let (mut total, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
-        for k in 0..PITCH_STEPS {
+        let room = |k: usize, side| {
             let psi = pitch * k as f64 / PITCH_STEPS as f64;
-            let room = |side| {
-                (-within..=within + 1)
-                    .filter_map(|tooth| self.gap(f64::from(tooth) * pitch - psi, side))
-                    .map(|gap| gap.gap_rad)
-                    .fold(f64::INFINITY, f64::min)
-            };
-            let (backward, forward) = (room(Side::Plus), room(Side::Minus));
+            let gaps = (-within..=within + 1).filter_map(|tooth| self.gap(f64::from(tooth) * pitch - psi, side));
+            gaps.map(|gap| gap.gap_rad).fold(f64::INFINITY, f64::min)
+        };
+        let rooms: Vec<[f64; 2]> =
+            (0..PITCH_STEPS).into_par_iter().map(|k| Side::BOTH.map(|side| room(k, side))).collect();
+        let (mut total, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
+        for [backward, forward] in rooms {
             total += backward + forward;
             low = low.min(forward);
             high = high.max(forward);

@@ -159,6 +159,8 @@ fn roll(from: f64, to: f64, t: f64) -> f64 {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToothFlank {
     pieces: [OutlinePiece; 5],
+    /// Radii at which root fillet, flank and tip rounding end, mm.
+    ends: [f64; 3],
     shape: FlankShape,
     /// Radius of the root circle and of the tip circle, mm.
     circles: (f64, f64),
@@ -260,7 +262,11 @@ impl ToothFlank {
             arc(PieceKind::TipLand, origin, tip_radius, tip.angle, ends),
         ];
         let circles = (root_radius, tip_radius);
-        Ok(ToothFlank { pieces, shape: wheel.shape.clone(), circles, internal, teeth: wheel.teeth })
+        let ends = [1, 2, 3].map(|k| {
+            let [x, y] = pieces[k].point(1.0);
+            x.hypot(y)
+        });
+        Ok(ToothFlank { pieces, ends, shape: wheel.shape.clone(), circles, internal, teeth: wheel.teeth })
     }
 
     /// The five pieces, root to tip; each starts where the one before ends, with the same tangent.
@@ -305,13 +311,8 @@ impl ToothFlank {
             return None;
         }
         let toward_tip = if self.internal { -1.0 } else { 1.0 };
-        let piece = self.pieces[1..4]
-            .iter()
-            .find(|piece| {
-                let [x, y] = piece.point(1.0);
-                (x.hypot(y) - radius) * toward_tip >= 0.0
-            })
-            .unwrap_or(&self.pieces[3]);
+        let within = self.ends.iter().position(|end| (end - radius) * toward_tip >= 0.0);
+        let piece = &self.pieces[1 + within.unwrap_or(2)];
         Some(match piece.curve {
             ToothCurve::Flank { shape: FlankShape::Chain(ref chain), .. } => {
                 let [x, y] = chain.point(chain.arc_at_radius(radius));
