@@ -427,11 +427,10 @@ fn run_under_load(
         Ok(relief) => {
             if relief.lowered_mm > 0.0 {
                 made.drive.flexspline.tip_radius_mm = relief.tip_radius_mm;
+                let so = if relief.left.is_some() { "still bear on one another" } else { "pass one another freely" };
                 for (_, formula) in made.formulas.iter_mut().filter(|(path, _)| *path == TIP_RADIUS) {
-                    *formula += &format!(
-                        ", lowered by {:.4} mm: so tips pass one another freely under {torque_n_m} N·m",
-                        relief.lowered_mm
-                    );
+                    *formula +=
+                        &format!(", lowered by {:.4} mm: so tips {so} under {torque_n_m} N·m", relief.lowered_mm);
                 }
             }
             (under.tips_lowered_mm, under.tip_contact) = (relief.lowered_mm, relief.left);

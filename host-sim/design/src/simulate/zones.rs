@@ -22,9 +22,21 @@ const NEXT: usize = 2;
 /// does to an output that is wound up by minutes is some hundredths of an arc-second.
 pub(crate) const MOST_TIP_SHARE: f64 = 1e-3;
 
+/// Largest relief of tips in all, modules. A guess: of the working depth of 1.35 modules it leaves more than half. A
+/// CSG-20-160 takes 0.5, the most of 27 sizes. Tips that reach further past those of the other wheel are in mesh.
+pub(crate) const MOST_MODULES: f64 = 0.6;
+
 /// Relief of clashing tips in one step, modules. A guess: the sizes of a catalogue need 0.1 to 0.5 in all, more
 /// the larger their ratio, as what gives way is in proportion to the size and not to the module ([`crate::relief`]).
 const RELIEF_MODULES: f64 = 0.1;
+
+/// What to change where tips of S-shaped teeth bear.
+const S_SHAPED: &str = "lower tips of the flexspline do not help S-shaped teeth, whose spaces they cut; higher \
+                        circular_spline.tip_radius_mm and tip_rounding_mm ease it; of involutes `new` lowers the tips";
+/// Where they bear deep in mesh: seen of rollers, which leave a thin rim to bend between them.
+const IN_MESH: &str = "so deep, lower tips may not help (`new` tries them); a thicker rim or another generator may";
+/// Elsewhere.
+const LOWER: &str = "lower flexspline.tip_radius_mm, STEP mm at a time, until none bears";
 
 /// A run of neighbouring teeth that bear on the same flank beside one lobe.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -68,9 +80,11 @@ pub struct TipContact {
     /// How far the teeth there reach past the tips of the circular spline, mm: tips that are lower by this do not bear
     /// at that place, but teeth nearer to the axis may.
     pub reach_mm: f64,
-    /// A step by which to lower them, mm; 0 of S-shaped teeth, whose spaces are cut by the tips: where these are lower,
-    /// so is the room.
+    /// A step by which to lower them, mm; 0 of S-shaped teeth: their spaces are cut by the tips, and as low.
     pub relief_step_mm: f64,
+    /// What to change.
+    #[serde(skip)]
+    pub remedy: &'static str,
 }
 
 /// A pair that bears.
@@ -172,12 +186,7 @@ impl TipContact {
              kinematic error, stiffness and pressure are those of this contact: {}",
             self.at_deg.abs(),
             100.0 * self.share,
-            match self.relief_step_mm {
-                0.0 => "lower tips of the flexspline do not help S-shaped teeth, whose spaces they cut; higher \
-                        circular_spline.tip_radius_mm and tip_rounding_mm ease it; of involutes `new` lowers the tips"
-                    .to_owned(),
-                step_mm => format!("lower flexspline.tip_radius_mm, {step_mm:.3} mm at a time, until none bears"),
-            }
+            self.remedy.replace("STEP", &format!("{:.3}", self.relief_step_mm))
         )
     }
 
@@ -188,13 +197,20 @@ impl TipContact {
         let main = || zones.iter().filter(|zone| zone.is_main);
         let worst = outside().max_by(|a, b| a.peak_mpa.total_cmp(&b.peak_mpa))?;
         let most = |of: fn(&Zone) -> f64| [outside().map(of).fold(0.0, f64::max), main().map(of).fold(0.0, f64::max)];
+        let reach_mm = outside().map(|zone| zone.reach_mm).fold(0.0, f64::max);
+        let (relief_modules, remedy) = match flexspline.profile {
+            Profile::S => (0.0, S_SHAPED),
+            Profile::Involute if reach_mm > MOST_MODULES * flexspline.module_mm => (RELIEF_MODULES, IN_MESH),
+            Profile::Involute => (RELIEF_MODULES, LOWER),
+        };
         Some(TipContact {
             share: outside().map(|zone| zone.share).sum(),
             at_deg: if worst.from_deg.abs() < worst.to_deg.abs() { worst.from_deg } else { worst.to_deg },
             largest_n: most(|zone| zone.largest_n),
             peak_mpa: most(|zone| zone.peak_mpa),
-            reach_mm: outside().map(|zone| zone.reach_mm).fold(0.0, f64::max),
-            relief_step_mm: if flexspline.profile == Profile::S { 0.0 } else { RELIEF_MODULES * flexspline.module_mm },
+            reach_mm,
+            relief_step_mm: relief_modules * flexspline.module_mm,
+            remedy,
         })
     }
 }
@@ -223,6 +239,8 @@ mod tests {
         assert!((tips.at_deg + 51.0).abs() < 1e-9 && tips.share == 0.1 && tips.counts(), "{tips:?}");
         assert_eq!(tips.peak_mpa, [1e4, 6e3]);
         assert!(tips.in_words().contains("tips bear on one another 51 deg") && tips.in_words().contains("0.050 mm"));
+        let deep = TipContact::of(&[main, Zone { reach_mm: 0.4, ..zones[1] }], &involute).unwrap();
+        assert!(deep.in_words().ends_with(IN_MESH));
         let s_shaped = TipContact::of(&zones, &s_shaped).unwrap().in_words();
         assert!(s_shaped.contains("S-shaped teeth, whose spaces they cut") && !s_shaped.contains("until none bears"));
         assert!(!TipContact { share: 0.5 * MOST_TIP_SHARE, ..tips }.counts());
