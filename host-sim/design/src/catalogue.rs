@@ -39,11 +39,15 @@ pub fn sheet(name: &str, size: f64, ratio: u32) -> Option<Stated> {
             format!("between Harmonic Drive {} and {}, by the cube of the size", of(below.size), of(above.size));
         (SizeRow::between(below, above, size), source)
     };
+    let other = rows.iter().find(|row| row.ratio != ratio && [below.size, above.size].contains(&row.size));
+    let shared = other.map_or_else(String::new, |other| {
+        format!("; i = {ratio} is not printed: its stiffness is that of i = {}, as of all from 80 to 160", other.ratio)
+    });
     let clone = if name.eq_ignore_ascii_case(series) { "" } else { ", of which this is a clone by its name" };
     let own = usize::from(["CSG", "SHG"].contains(&series));
     let [t1_n_m, t2_n_m, k1_n_m_per_rad, k2_n_m_per_rad, k3_n_m_per_rad] = row.stiffness.map(Some);
     Some(Stated {
-        source: Some(source + clone),
+        source: Some(source + clone + &shared),
         rated_torque_n_m: row.rated_n_m[own],
         t1_n_m,
         t2_n_m,
@@ -141,6 +145,7 @@ mod tests {
         let [odd, like] = [90, 100].map(|ratio| sheet("CSG", 25.0, ratio).unwrap());
         assert_eq!((odd.k1_n_m_per_rad, odd.t2_n_m), (like.k1_n_m_per_rad, like.t2_n_m));
         assert_eq!((odd.rated_torque_n_m, odd.ratcheting_torque_n_m), (None, None));
+        assert!(odd.source.unwrap().contains("i = 90 is not printed: its stiffness is that of i = 80"));
         for (name, size, ratio) in [
             ("CSG", 25.0, 60),
             ("CSF", 25.0, 40),
