@@ -462,7 +462,7 @@ fn fields_that_make_no_drive_are_refused_before_anything_runs() {
 #[test]
 fn constraints_leave_out_and_the_front_is_pareto_optimal() {
     let plan = of_fields(&["generator.w0_mm=0.46..0.5:5"], &[GeneratorKind::Cam]).unwrap();
-    let mut rows: Vec<VariantRow> = [(1.0, 300.0), (2.0, 200.0), (3.0, 250.0), (0.5, 500.0), (2.0, 200.0)]
+    let mut rows: Vec<VariantRow> = [(1.0, 300.0), (2.0, 200.0), (1.9992, 250.0), (0.5, 500.0), (2.0, 200.0)]
         .iter()
         .enumerate()
         .map(|(k, (e, s))| row(&plan, k, &[("kinematic_error_pp_arcsec", *e), ("max_von_mises_mpa", *s)]))
@@ -473,7 +473,7 @@ fn constraints_leave_out_and_the_front_is_pareto_optimal() {
     let judge = Judge { constraints, targets: vec![least("kinematic_error_pp_arcsec"), least("max_von_mises_mpa")] };
     let judge = judge.of(&plan).unwrap();
     judge.mark(&plan, &mut rows);
-    // The second interferes, the third is beaten by the fifth, the fourth breaks the constraint.
+    // The second interferes, the fourth breaks the constraint, the fifth beats the third: no mesh settles 0.0008″.
     assert_eq!(rows.iter().map(|row| row.meets).collect::<Vec<_>>(), [true, false, true, false, true]);
     assert_eq!(rows.iter().map(|row| row.is_front).collect::<Vec<_>>(), [true, false, false, false, true]);
 }
