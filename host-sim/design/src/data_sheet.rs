@@ -108,6 +108,14 @@ pub struct WindUpPart {
     pub percent: f64,
 }
 
+/// What to know of a wind-up that is empirical in part.
+pub fn empirical_in_words(wind_up_arcsec: f64, torque_n_m: f64, percent: f64) -> String {
+    format!(
+        "of the wind-up of {wind_up_arcsec:.1} arcsec at {torque_n_m} N·m {percent:.0} % are empirical \
+         (output.contact_compliance), not FEM"
+    )
+}
+
 /// The wind-up of a drive at rest from first contact to a load, part by part: teeth and rim alone; what sleeve and
 /// balls add, in this order; and the empirical part ([`Drive::contact_wind_up_rad`]).
 ///

@@ -15,6 +15,7 @@ use super::page::{
     ChartAxis, ChartSeries, Choice, FieldMap, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock, PageQuantity,
     PageSection, RichText, SIGNS, Status, made_of_drive,
 };
+use flexspline_design::data_sheet::empirical_in_words;
 use flexspline_design::simulate::{Observation, Row, Simulation, Summary, TipContact};
 use flexspline_design::stated;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Side};
@@ -104,12 +105,19 @@ pub fn simulation_report(
         first.blocks.insert(0, PageBlock::row(known.caption(), &summary.figures(), &FIRST_FIGURES));
     }
     sections.extend([known.found(), known.load(), sizes_section(drive)?, known.reading()]);
-    let remarks: Vec<String> = summary.cautions.iter().map(|caution| format!("{}.", caution_words(caution))).collect();
+    let empirical = summary.wind_up_parts.last().zip(summary.torque_n_m);
+    let remark = empirical
+        .map(|(part, torque_n_m)| empirical_in_words(100.0 * part.arcsec / part.percent, torque_n_m, part.percent));
+    let remarks: Vec<String> = summary.cautions.iter().map(caution_words).chain(remark).collect();
     Ok(Page {
         title: format!("{} along a path", drive.name),
         command_name: "simulate",
-        status: if remarks.is_empty() { Status::Good } else { Status::Caution },
-        remarks,
+        status: match (summary.cautions.is_empty(), remarks.is_empty()) {
+            (true, true) => Status::Good,
+            (true, false) => Status::Remark,
+            _ => Status::Caution,
+        },
+        remarks: remarks.into_iter().map(|remark| remark + ".").collect(),
         choices: vec![Choice { id: kind.to_string(), name: kind.in_words().to_owned() }],
         choice_is: "Generator",
         headlines: vec![known.headline()],

@@ -13,7 +13,7 @@ use super::sweep::{Sampler, SweepPlan, SweepProgress, TorqueSweepError, planned_
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
 use crate::cautions::{Caution, LookedAt, rigid_gap_um, room_as_built_arcsec};
-use crate::data_sheet::Stiffness;
+use crate::data_sheet::{Stiffness, empirical_in_words};
 use crate::relief::tips_that_bear;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
@@ -212,21 +212,15 @@ pub fn make(
     };
     made.info.torque_nodes_resolved = Some(chosen.resolved);
     let table = flexspline::Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
-    made.info.remarks.extend(empirical_percent(&table).map(|percent| {
-        let [_, whole] = made.info.wind_up_arcsec;
-        format!(
-            "of the wind-up of {whole:.1} arcsec at {largest_n_m} N·m {percent} % are empirical \
-             (output.contact_compliance), not FEM"
-        )
-    }));
+    let [_, whole] = made.info.wind_up_arcsec;
+    made.info.remarks.extend(empirical_percent(&table).map(|percent| empirical_in_words(whole, largest_n_m, percent)));
     let looked = LookedAt {
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),
-        max_von_mises_mpa: None,
-        root_fillet_mpa: None,
         peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
         tip_contact: tips.ok().flatten(),
         slope_bound: Some(f64::from(made.info.slope_bound)),
+        ..LookedAt::default()
     };
     made.info.cautions = Caution::of_stiffness(drive).into_iter().chain(looked.cautions()).collect();
     made.info.stiffness = Stiffness::of_table(drive, &table);
