@@ -49,8 +49,8 @@ const BEYOND_STEEL: f64 = 3.0;
 /// three to five times the rated torque.
 const MOST_OF_RATED: f64 = 5.0;
 
-/// Ratios at which catalogues bear out FEM, cup, balls and [`Drive::CATALOGUE_CONTACT`] within 19 %: measured at 50, 80,
-/// 100 and 120. At 160 K1 is up to 28 % too stiff; on a line from the 17 % of 120 it leaves these 19 % near 130.
+/// Ratios at which catalogues bear out FEM, cup, balls and [`Drive::CATALOGUE_CONTACT`] within 19 %: measured at 50,
+/// 80, 100 and 120. At 160 K1 is up to 28 % too stiff; on a line from the 17 % of 120 it leaves these 19 % near 130.
 const BORNE_OUT_RATIOS: [f64; 2] = [50.0, 130.0];
 /// Pitch diameter of the least size that they bear out, 17, mm, less rounding.
 const LEAST_BORNE_OUT_MM: f64 = 43.0;
@@ -166,10 +166,10 @@ impl LookedAt {
             )
         });
         say(place, stress, 1.0, YIELD_MPA, &|stress| match self.root_fillet_mpa {
-            // Where no finer mesh found equilibrium the two are one.
-            Some([one, judged]) if place == ROOT_FILLET && one != judged => format!(
-                "a root fillet has {stress:.0} MPa on a finer mesh and {one:.0} on this one; {YIELD_MPA} MPa are where \
-                 steel yields: simulate --stress judges it over three meshes"
+            Some([one, judged]) if place == ROOT_FILLET => format!(
+                "a root fillet has {one:.0} MPa on this mesh and {} on a finer one; {YIELD_MPA} MPa are where steel \
+                 yields: simulate --stress judges it over three meshes",
+                if one == judged { "no equilibrium".to_owned() } else { format!("{judged:.0}") }
             ),
             _ => above_yield(stress, ""),
         });
