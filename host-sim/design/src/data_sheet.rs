@@ -367,15 +367,3 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     (sheet.root_fillet_mpa, sheet.bore_mpa) = (Some(root_fillet), Some(bore));
     Ok(())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cautions_look_at_the_stress_in_root_fillets_too() {
-        let judged_fillet_mpa = Some([1777.0, 1204.0]);
-        let sheet = DataSheet { max_von_mises_mpa: Some(664.0), judged_fillet_mpa, ..DataSheet::default() };
-        assert_eq!(sheet.looked().cautions()[0].figure, "root_fillet_mpa");
-    }
-}
