@@ -331,8 +331,8 @@ pub fn beside(
     let starting_n_m = further(stated.starting_torque_n_m, &|problem, _| starting_n_m(&problem));
     let arcmin = |arcsec: Option<f64>| arcsec.map(|x| x / 60.0);
     // The error of tips that clash is no accuracy of the drive.
-    let clashes = sheet.tip_contact.is_some_and(|tips| tips.counts());
-    let accuracy = arcmin(sheet.kinematic_error_pp_arcsec.filter(|_| !clashes));
+    let clash = sheet.tip_contact.filter(|tips| tips.counts());
+    let accuracy = arcmin(sheet.kinematic_error_pp_arcsec.filter(|_| clash.is_none()));
     let figures = [
         ("k1_n_m_per_rad", stated.k1_n_m_per_rad, sheet.k1_n_m_per_rad),
         ("k2_n_m_per_rad", stated.k2_n_m_per_rad, sheet.k2_n_m_per_rad),
@@ -367,11 +367,7 @@ pub fn beside(
         assumed: stated.assumed(),
         sheet,
         beside,
-        why: match (why, sheet.tip_contact.filter(|tips| tips.counts())) {
-            (Some(error), _) => Some(error.to_string()),
-            (None, Some(tips)) => Some(tips.in_words()),
-            (None, None) => None,
-        },
+        why: why.map(|error| error.to_string()).or(clash.map(|tips| tips.in_words())),
     }
 }
 

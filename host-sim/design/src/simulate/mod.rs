@@ -107,16 +107,13 @@ impl SimulationSettings {
             }
         }
         let (coldest, warmest) = (drive.temperature.minimum_c, drive.temperature.maximum_c);
-        let within = |temperature: f64| (coldest..=warmest).contains(&temperature);
         let points = match &self.path {
+            Path::Points(points) if points.is_empty() => {
+                return refuse("path", "no points".into(), "at least one".into());
+            }
             Path::Points(points) => points.as_slice(),
             _ => &[],
         };
-        if let Path::Points(points) = &self.path
-            && points.is_empty()
-        {
-            return refuse("path", "no points".into(), "at least one".into());
-        }
         let torques = points.iter().filter_map(|p| p.torque_n_m).chain([self.torque_n_m]);
         for torque in torques {
             if torque.is_nan() || torque.abs() > LARGEST_TORQUE_N_M {
@@ -129,7 +126,7 @@ impl SimulationSettings {
         }
         let temperatures = points.iter().filter_map(|p| p.temperature_c).chain(self.temperature_c);
         for temperature in temperatures {
-            if !within(temperature) {
+            if !(coldest..=warmest).contains(&temperature) {
                 let allowed = format!("{coldest} to {warmest} C, the operating range of the drive");
                 return refuse("temperature", temperature.to_string(), allowed);
             }
@@ -349,29 +346,24 @@ impl<'a> RunState<'a> {
     }
 
     fn along_path(&mut self) -> Result<(), SimulateError> {
-        match &self.settings.path {
+        let targets: Vec<PathTarget> = match &self.settings.path {
+            Path::Pitch => return self.settle_and_turn(self.pitch),
+            Path::Turn => return self.settle_and_turn(TAU),
             Path::Paper => {
                 let increment = self.settings.increment_rad.unwrap_or(PAPER_INCREMENT_RAD);
-                let angles = [line(0.0, 1.0, increment), line(1.0, -1.0, increment)].concat();
-                let targets: Vec<PathTarget> =
-                    [0.0].into_iter().chain(angles).map(|angle| self.target(angle)).collect();
-                self.follow(&targets)?;
+                let angles = [vec![0.0], line(0.0, 1.0, increment), line(1.0, -1.0, increment)].concat();
+                angles.into_iter().map(|angle| self.target(angle)).collect()
             }
-            Path::Points(points) => {
-                let targets: Vec<PathTarget> = points
-                    .iter()
-                    .map(|point| PathTarget {
-                        generator_rad: point.generator_rad,
-                        torque_n_m: point.torque_n_m.unwrap_or(self.settings.torque_n_m),
-                        temperature_c: point.temperature_c.unwrap_or(self.temperature_c),
-                    })
-                    .collect();
-                self.follow(&targets)?;
-            }
-            Path::Pitch => self.settle_and_turn(self.pitch)?,
-            Path::Turn => self.settle_and_turn(TAU)?,
-        }
-        Ok(())
+            Path::Points(points) => points
+                .iter()
+                .map(|point| PathTarget {
+                    generator_rad: point.generator_rad,
+                    torque_n_m: point.torque_n_m.unwrap_or(self.settings.torque_n_m),
+                    temperature_c: point.temperature_c.unwrap_or(self.temperature_c),
+                })
+                .collect(),
+        };
+        self.follow(&targets)
     }
 
     fn target(&self, generator_rad: f64) -> PathTarget {
@@ -447,8 +439,7 @@ impl<'a> RunState<'a> {
     }
 
     fn increments_to_start(&self, torque_n_m: f64, one_load: bool) -> usize {
-        let touches = if one_load && self.exceeds_drag(torque_n_m) { 2 } else { 0 };
-        1 + touches + usize::from(torque_n_m != 0.0)
+        1 + 2 * usize::from(one_load && self.exceeds_drag(torque_n_m)) + usize::from(torque_n_m != 0.0)
     }
 
     /// Deforms the drive, touches, loads. Gives the last increment with the iterations of deforming and loading.
@@ -569,10 +560,7 @@ impl<'a> RunState<'a> {
             self.zones = (pressure_mpa, zones);
         }
         // Rows of a path that begins with the deformed drive count from 0, others from 1.
-        let step = match self.rows.last() {
-            Some(row) => row.step + 1,
-            None => usize::from(turn_rad != 0.0),
-        };
+        let step = self.rows.last().map_or(usize::from(turn_rad != 0.0), |row| row.step + 1);
         let row = Row {
             step,
             generator_rad: state.generator_rad,

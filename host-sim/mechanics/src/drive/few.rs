@@ -78,14 +78,10 @@ impl FewNumbers {
         if !(0.05..=10.0).contains(&m) {
             return refuse("module", format!("found {m}, allowed: 0.05 to 10 mm"));
         }
-        let mut refused = None;
-        for heights in HEIGHTS {
-            match self.with_heights(name, heights) {
-                Ok(made) => return Ok(made),
-                Err(error) => refused = refused.or(Some(error)),
-            }
-        }
-        Err(refused.unwrap_or_else(|| Problem::of("teeth", "no room").into()))
+        self.with_heights(name, HEIGHTS[0]).or_else(|error| {
+            let lower = HEIGHTS[1..].iter().find_map(|heights| self.with_heights(name, *heights).ok());
+            lower.ok_or(error)
+        })
     }
 
     /// The drive with these heights of its teeth, modules: tip of the flexspline, root of the circular spline.

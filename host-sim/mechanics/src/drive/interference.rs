@@ -204,8 +204,7 @@ impl RigidMesh {
             let Some(k) = least.filter(|&k| tried[k].is_some()) else {
                 continue;
             };
-            let at = |k: usize| k as f64 / PIECE_STEPS as f64;
-            let (low, high) = (at(k.saturating_sub(1)), at((k + 1).min(PIECE_STEPS)));
+            let [low, high] = [k.saturating_sub(1), (k + 1).min(PIECE_STEPS)].map(|k| k as f64 / PIECE_STEPS as f64);
             let refined = piece.point(golden(|t| value(&gap_at(piece.point(t))), low, high));
             for (point, gap) in [(points[k], tried[k]), (refined, gap_at(refined))] {
                 let Some([radius, gap_rad]) = gap.filter(|[_, gap]| best.is_none_or(|best| *gap < best.gap_rad)) else {
@@ -233,9 +232,6 @@ impl RigidMesh {
     }
 
     /// Generators under which the teeth of a drive interfere, and the least gap there.
-    ///
-    /// # Errors
-    /// An outline that cannot be drawn.
     pub fn interfering(drive: &Drive) -> Result<Vec<(GeneratorKind, FlankGap)>, DriveError> {
         let of = |kind| {
             let found = RigidMesh::new(drive, kind)?.scan();
@@ -298,10 +294,9 @@ impl RigidMesh {
 
     /// Free rotation of the output at the tightest place of a whole turn, with the teeth as built and rigid.
     ///
-    /// Errors of teeth, spaces, axes, rim and generator move each tooth against its space, to first order: the least
-    /// gap of the drawing,
-    /// `RigidMesh::gap`, opens and closes by what the motion has along the normal of the flank. A turn of the output
-    /// is looked at in 1999 places. Missing where the teeth never meet.
+    /// Errors of teeth, spaces, axes, rim and generator move each tooth against its space, to first order: its least
+    /// gap as drawn opens and closes by what the motion has along the normal of the flank. A turn of the output is
+    /// looked at in 1999 places. Missing where the teeth never meet.
     pub fn room_as_built(&self, drive: &Drive, generator: GeneratorKind) -> Option<Room> {
         let moved = FlankDeviations::new(drive);
         let built = &drive.as_built;
