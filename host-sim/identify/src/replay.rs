@@ -9,7 +9,7 @@ use flexspline::{GeneratorAngle, PlayState, Prediction, Quality, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::calibrate::{INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
+use crate::calibrate::{Beside, INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
 use crate::extension::{left_by_core, less, without_zero};
 use crate::known_rows::parse_known;
 use crate::measurement::{
@@ -89,10 +89,9 @@ pub struct ReplaySummary {
     pub torque_counts_from: &'static str,
     /// Residual of the table with the torque's sign turned, arcsec rms, where the rows show that it is.
     pub torque_turned_rms_arcsec: Option<f64>,
-    /// Residual of the table with another spring and another wave of the output, arcsec rms, where the load goes with
-    /// the angle of the output and that is clearly less: another posture or payload than those of the table.
+    /// Other reasons that the rows allow for what the table leaves.
     #[serde(skip)]
-    other_load_rms_arcsec: Option<f64>,
+    reasons: Vec<String>,
     /// Whose rows they are, where that is known.
     pub rows_of: Option<RowsOf>,
     /// Remarks on them: that they are another drive's, or nobody's.
@@ -183,13 +182,7 @@ impl ReplaySummary {
     /// Remarks where the table gains less than it could, or nothing: each explanation that the rows allow.
     fn of_gain(&self) -> Vec<String> {
         let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
-        let mut why = Vec::from_iter(self.other_load_rms_arcsec.map(|without| {
-            format!(
-                "the load follows the angle of the output here, and another stiffness and output wave would reduce the \
-                 residual to {without:.1} arcsec rms: the rows may be of another posture or payload than those of \
-                 the table; calibrate on both together"
-            )
-        }));
+        let mut why = self.reasons.clone();
         why.extend(self.torque_turned_rms_arcsec.map(|turned| {
             format!(
                 "the torque has the wrong sign: with the other one the residual is {turned:.1} arcsec rms; positive is \
@@ -309,13 +302,41 @@ pub(crate) fn by_core(table: &Table<'_>, rows: impl Iterator<Item = [f64; 3]>) -
     })
 }
 
-/// Runs the core over the rows, from a state it does not know. `wind_up` is what the calibration of the table says of
-/// torques, if there was one.
+/// Why a table leaves much of rows, but for the torque's sign: what `explained` found, or what its calibration knows.
+fn reasons([other_load, delay]: [Option<f64>; 2], calibrated: &Beside, left_arcsec: f64) -> Vec<String> {
+    let delay = delay.map(|without| {
+        format!(
+            "`calibrate` took a delay between the two angles out of its rows, and these still have it: without what \
+             goes with the speed the residual is {without:.1} arcsec rms; read both at one instant, or give the \
+             controller the delay"
+        )
+    });
+    let other_load = other_load.map(|without| {
+        format!(
+            "the load follows the angle of the output here, and another stiffness and output wave would reduce the \
+             residual to {without:.1} arcsec rms: the rows may be of another posture or payload than those of the \
+             table; calibrate on both together"
+        )
+    });
+    let [as_recorded, anywhere] = calibrated.half_widths_arcsec;
+    let one_load = calibrated.load_with_output_angle.filter(|_| left_arcsec > as_recorded).map(|correlation| {
+        format!(
+            "the table was calibrated on a load that goes with the angle of the output (correlation \
+             {correlation:.2}), and under other loads, or none, it is off by ±{anywhere:.0} arcsec; calibrate on both \
+             together"
+        )
+    });
+    delay.into_iter().chain(other_load.or(one_load)).collect()
+}
+
+/// Runs the core over the rows, from a state it does not know. `calibrated` is what the calibration of the table says,
+/// if there was one.
 pub fn replay(
     table: &Table<'_>,
     rows: &[MeasuredRow],
-    wind_up: Option<WindUpTorque>,
+    calibrated: Option<Beside>,
 ) -> (Vec<ReplayedRow>, ReplaySummary) {
+    let calibrated = calibrated.unwrap_or_default();
     let mut by_quality = [0; 4];
     let states = rows.iter().map(|row| [row.generator_rad, row.torque_n_m, row.temperature_c]);
     let mut said: Vec<Prediction> = by_core(table, states).collect();
@@ -328,7 +349,10 @@ pub fn replay(
         measured.iter().zip(predicted).map(|(measured, predicted)| measured - predicted).collect();
     let mean_residual_arcsec = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
     let off: Vec<f64> = residuals.iter().map(|residual| (residual - mean_residual_arcsec).abs()).collect();
-    let torques = torques_read(table, rows, &off, wind_up);
+    let [torque_turned_rms_arcsec, found @ ..] = explained(table, rows, calibrated.has_delay);
+    let rms_residual_arcsec = about_mean(&residuals);
+    let reasons = reasons(found, &calibrated, rms_residual_arcsec);
+    let torques = torques_read(table, rows, &off, calibrated.torque_from_wind_up);
     let replayed =
         rows.iter().zip(&said).zip(residuals.iter().zip(torques)).map(|((row, said), (residual, torque))| {
             by_quality[said.quality as usize] += 1;
@@ -347,20 +371,19 @@ pub fn replay(
             }
         });
     let replayed: Vec<ReplayedRow> = replayed.collect();
-    let [torque_turned_rms_arcsec, other_load_rms_arcsec] = explained(table, rows);
     let mut summary = ReplaySummary {
         schema_version: 1,
         status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
         table_id: table.id().to_string(),
         rows: replayed.len(),
         rms_measured_arcsec: about_mean(&measured),
-        rms_residual_arcsec: about_mean(&residuals),
+        rms_residual_arcsec,
         max_residual_arcsec: off.iter().copied().fold(0.0, f64::max),
         mean_residual_arcsec,
         rows_by_quality: by_quality,
         torque_counts_from: if has_torque(rows) { "no load" } else { "mean row" },
         torque_turned_rms_arcsec,
-        other_load_rms_arcsec,
+        reasons,
         ..ReplaySummary::default()
     };
     summary.of_rows(None, table);

@@ -59,7 +59,7 @@ pub(crate) use table::{APART, JUMP_HALF_WIDTH, RIPPLE_NODES};
 
 use together::{Agreement, Starts, ZERO};
 pub(crate) use torque::INSIDE;
-pub use torque::WindUpTorque;
+pub use torque::{Beside, WindUpTorque};
 pub(crate) use zero::{Alignment, steady};
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
@@ -341,6 +341,10 @@ pub struct Calibration {
     pub half_width_as_recorded_arcsec: f64,
     /// As the first, at any other pace and at rest: with all that a delay which these logs do not show may have done.
     pub half_width_at_another_pace_arcsec: f64,
+    /// Correlation of the load with the output's angle, where that makes the first wide: rows under other loads make
+    /// it narrower, more of the same do not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_with_output_angle: Option<f64>,
     /// Phase of the table that was known before, if one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<Alignment>,
@@ -753,7 +757,9 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
     let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     let beyond = (half_width_arcsec.powi(2) - half_width_as_recorded_arcsec.powi(2)).max(0.0).sqrt();
-    notes.extend((!beside.is_empty() && beyond > half_width_as_recorded_arcsec).then(|| {
+    let decides = !beside.is_empty() && beyond > half_width_as_recorded_arcsec;
+    let load_with_output_angle = decides.then_some(correlation);
+    notes.extend(load_with_output_angle.map(|correlation| {
         format!(
             "the load goes with the angle of the output (correlation {correlation:.2}), as the weight of an arm does: \
              wind-up and waves of the output are one there, and under another load at the same angles the table, and \
@@ -804,6 +810,7 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
         half_width_arcsec,
         half_width_as_recorded_arcsec,
         half_width_at_another_pace_arcsec,
+        load_with_output_angle,
         alignment,
         split,
         ratio: prior.nominal.ratio,
