@@ -371,9 +371,11 @@ def calibrate(
         )
     made = Calibration(text, Table._made(parts), Columns(rows))
     if made.half_width_arcsec > made.held_out.rms_before_arcsec:
+        one_load = "load_with_output_angle" in made
+        narrower = "the load went with the output's angle: rows under other loads" if one_load else "more or calmer rows"
         warnings.warn(
             f"calibrate: error with the table +-{made.half_width_arcsec:.3g} arcsec (95 % interval), where {made.held_out.rms_before_arcsec:.3g} rms "
-            "were measured; more or calmer rows make it narrower",
+            f"were measured; {narrower} make it narrower",
             stacklevel=2,
         )
     return made
