@@ -108,7 +108,8 @@ typedef struct fxt_verdict {
 
 /** How far an answer can be trusted, worst last. */
 typedef enum fxt_quality {
-    FXT_IN_RANGE = 0,
+    FXT_IN_RANGE = 0, /**< torque and temperature in the range of the table, side of the play known. Not covered: output angles, or loads at an
+                         angle, that were not recorded. The end of fxt_info.mesh_level (", turn ...") says the former, calibration.json both */
     FXT_UNCERTAIN,    /**< known to within the uncertainty only: inside a jump, or the side of the play is not known yet */
     FXT_EXTRAPOLATED, /**< torque or temperature outside the range of the table; the value at its edge is used */
     FXT_DISABLED      /* no correction: an input was not finite, a number from a changed image is beyond the limits of the table, or in the
@@ -176,7 +177,7 @@ typedef struct fxt_play {
 typedef struct fxt_prediction {
     int64_t output, nominal;      /**< counts; nominal: generator over ratio */
     float transmission_error_rad; /**< actual less nominal; 0 when disabled */
-    float uncertainty_rad;        /**< the error lies within this of it, as far as play and jumps go */
+    float uncertainty_rad;        /**< the error lies within this of it, as far as play and jumps go: 0 is not that the table is exact */
     fxt_quality quality;
 } fxt_prediction;
 

@@ -215,7 +215,7 @@
 // No correction, and none before off was asked for: after a fault.
 #define FLEXSPLINE_MODE_SAFE 3
 
-// Trust estimate and correction.
+// Trust estimate and correction. Output angles, and loads at an angle, that were not recorded count as inside.
 #define FLEXSPLINE_QUALITY_IN_RANGE 0
 
 // The side of the play is not known yet: the uncertainty says by how much the estimate can be off.

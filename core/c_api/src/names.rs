@@ -21,7 +21,7 @@ pub const FLEXSPLINE_MODE_HOLD: u8 = 2;
 /// No correction, and none before off was asked for: after a fault.
 pub const FLEXSPLINE_MODE_SAFE: u8 = 3;
 
-/// Trust estimate and correction.
+/// Trust estimate and correction. Output angles, and loads at an angle, that were not recorded count as inside.
 pub const FLEXSPLINE_QUALITY_IN_RANGE: u8 = 0;
 /// The side of the play is not known yet: the uncertainty says by how much the estimate can be off.
 pub const FLEXSPLINE_QUALITY_UNCERTAIN: u8 = 1;

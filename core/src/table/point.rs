@@ -10,7 +10,8 @@ numbered! { coded
     /// How far an answer can be trusted, worst last.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
     pub enum Quality {
-        /// Inside the range of the table, side of the play known.
+        /// Inside the torques and temperatures of the table, side of the play known. Output angles, and loads at an
+        /// angle, that were not recorded count as inside.
         InRange,
         /// The error is known only to within the uncertainty reported: the torque lies inside a jump, or the side of
         /// the play is not known yet.
