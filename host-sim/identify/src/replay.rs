@@ -9,7 +9,7 @@ use flexspline::{GeneratorAngle, PlayState, Prediction, Quality, Table};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::calibrate::{Beside, INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
+use crate::calibrate::{CalibrationFile, INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
 use crate::extension::{left_by_core, less, without_zero};
 use crate::known_rows::parse_known;
 use crate::measurement::{
@@ -303,12 +303,11 @@ pub(crate) fn by_core(table: &Table<'_>, rows: impl Iterator<Item = [f64; 3]>) -
 }
 
 /// Why a table leaves much of rows, but for the torque's sign: what `explained` found, or what its calibration knows.
-fn reasons([other_load, delay]: [Option<f64>; 2], calibrated: &Beside, left_arcsec: f64) -> Vec<String> {
+fn reasons([other_load, delay]: [Option<f64>; 2], calibrated: &CalibrationFile, left_arcsec: f64) -> Vec<String> {
     let delay = delay.map(|without| {
         format!(
-            "`calibrate` took a delay between the two angles out of its rows, and these still have it: without what \
-             goes with the speed the residual is {without:.1} arcsec rms; read both at one instant, or give the \
-             controller the delay"
+            "`calibrate` took a delay between the two angles out of its rows, which these still have: without what \
+             goes with the speed the residual is {without:.1} arcsec rms"
         )
     });
     let other_load = other_load.map(|without| {
@@ -318,7 +317,7 @@ fn reasons([other_load, delay]: [Option<f64>; 2], calibrated: &Beside, left_arcs
              table; calibrate on both together"
         )
     });
-    let [as_recorded, anywhere] = calibrated.half_widths_arcsec;
+    let (as_recorded, anywhere) = (calibrated.half_width_as_recorded_arcsec, calibrated.half_width_arcsec);
     let one_load = calibrated.load_with_output_angle.filter(|_| left_arcsec > as_recorded).map(|correlation| {
         format!(
             "the table was calibrated on a load that goes with the angle of the output (correlation \
@@ -334,7 +333,7 @@ fn reasons([other_load, delay]: [Option<f64>; 2], calibrated: &Beside, left_arcs
 pub fn replay(
     table: &Table<'_>,
     rows: &[MeasuredRow],
-    calibrated: Option<Beside>,
+    calibrated: Option<CalibrationFile>,
 ) -> (Vec<ReplayedRow>, ReplaySummary) {
     let calibrated = calibrated.unwrap_or_default();
     let mut by_quality = [0; 4];
@@ -349,7 +348,7 @@ pub fn replay(
         measured.iter().zip(predicted).map(|(measured, predicted)| measured - predicted).collect();
     let mean_residual_arcsec = residuals.iter().sum::<f64>() / residuals.len().max(1) as f64;
     let off: Vec<f64> = residuals.iter().map(|residual| (residual - mean_residual_arcsec).abs()).collect();
-    let [torque_turned_rms_arcsec, found @ ..] = explained(table, rows, calibrated.has_delay);
+    let [torque_turned_rms_arcsec, found @ ..] = explained(table, rows, calibrated.has_delay());
     let rms_residual_arcsec = about_mean(&residuals);
     let reasons = reasons(found, &calibrated, rms_residual_arcsec);
     let torques = torques_read(table, rows, &off, calibrated.torque_from_wind_up);

@@ -9,7 +9,7 @@ use super::context::{Context, image_file, quoted, table_of};
 use super::logs::LogOptions;
 use super::{Failure, bad_input, say};
 use flexspline_base::output::Outputs;
-use flexspline_identify::calibrate::Beside;
+use flexspline_identify::calibrate::CalibrationFile;
 use flexspline_identify::measurement::bytes_of;
 use flexspline_identify::replay::{ReplaySummary, RowsOf, RowsRead, read, replay};
 use flexspline_mechanics::drive::GeneratorKind;
@@ -56,7 +56,7 @@ impl Replay {
         // Found out before the rows are read.
         context.out()?;
         let RowsRead { rows, faults, notes } = measured(&self.data, &self.logs, &table, self.temperature_c, true)?;
-        let (replayed, mut summary) = replay(&table, &rows, Beside::read(&self.tables, &table));
+        let (replayed, mut summary) = replay(&table, &rows, CalibrationFile::read(&self.tables, &table));
         (summary.data_faults, summary.notes) = (faults, notes);
         summary.command.clone_from(&context.command);
         summary.of_rows(rows_of, &table);
@@ -67,9 +67,7 @@ impl Replay {
         outputs.finish()?;
         context.print(&summary, || text(&summary, out) + &say::next(&self.next(context)))
     }
-}
 
-impl Replay {
     /// That the rows are of the drive and the generator of the table, as far as anybody says.
     fn check_rows(&self, rows_of: Option<&RowsOf>, table: &Table<'_>) -> Result<(), Failure> {
         match rows_of.and_then(|rows| rows.problem(table)) {

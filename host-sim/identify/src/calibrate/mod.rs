@@ -59,7 +59,7 @@ pub(crate) use table::{APART, JUMP_HALF_WIDTH, RIPPLE_NODES};
 
 use together::{Agreement, Starts, ZERO};
 pub(crate) use torque::INSIDE;
-pub use torque::{Beside, WindUpTorque};
+pub use torque::{CalibrationFile, WindUpTorque};
 pub(crate) use zero::{Alignment, steady};
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.

@@ -644,11 +644,9 @@ fn torques_are_not_known_where_a_part_of_the_turn_was_not_recorded() {
     let made = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
     let table = Table::check(&made.table.image).unwrap();
     let rows: Vec<_> = measured_rows(&whole.sessions, 20.0).collect();
-    let (replayed, summary) = replay(
-        &table,
-        &rows,
-        Some(Beside { torque_from_wind_up: made.calibration.torque_from_wind_up, ..Beside::default() }),
-    );
+    let torque_from_wind_up = made.calibration.torque_from_wind_up;
+    let calibrated = CalibrationFile { torque_from_wind_up, ..CalibrationFile::default() };
+    let (replayed, summary) = replay(&table, &rows, Some(calibrated));
     let ends = |row: &ReplayedRow| [row.torque_from_wind_up_low_n_m, row.torque_from_wind_up_high_n_m];
     let (there, elsewhere): (Vec<_>, Vec<_>) = replayed.iter().partition(|row| was_recorded(&table, row.generator_rad));
     let holds = |row: &&&ReplayedRow| ends(row)[0] <= row.torque_n_m && row.torque_n_m <= ends(row)[1];

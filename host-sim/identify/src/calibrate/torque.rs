@@ -113,34 +113,30 @@ fn hysteresis_in((gram, model): &(Gram, Model), [springs, powers]: [usize; 2]) -
     }
 }
 
-/// What a [calibration](super::Calibration) says that its table does not.
-#[derive(Debug, Clone, Default)]
-pub struct Beside {
-    /// How good a torque from the wind-up is.
-    pub torque_from_wind_up: Option<WindUpTorque>,
-    /// Whether a delay between the readings was taken out of its rows.
-    pub has_delay: bool,
-    /// Correlation of its loads with the output's angle, where that decides how well the table is known.
-    pub load_with_output_angle: Option<f64>,
-    /// Half width of the table's error as recorded, and over all loads and angles, arcsec.
-    pub half_widths_arcsec: [f64; 2],
+/// What `calibration.json` says that the table does not.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub struct CalibrationFile {
+    pub(crate) torque_from_wind_up: Option<WindUpTorque>,
+    pub(crate) load_with_output_angle: Option<f64>,
+    pub(crate) half_width_as_recorded_arcsec: f64,
+    pub(crate) half_width_arcsec: f64,
+    pub(crate) readings: Vec<Value>,
+    pub(crate) table_id: String,
 }
 
-impl Beside {
-    /// Of `calibration.json` in the folder of a table, if that is of this table.
+impl CalibrationFile {
+    /// Of the file in the folder of a table, if that is of this table.
     #[must_use]
     pub fn read(file: &Path, table: &Table<'_>) -> Option<Self> {
         let text = std::fs::read_to_string(file.with_file_name("calibration.json")).ok()?;
-        let mut calibration: Value = serde_json::from_str(&text).ok()?;
-        let is_of_table = calibration["table_id"] == table.id().to_string();
-        let is_delay = |reading: &Value| reading["name"] == DELAY;
-        let half_widths = ["half_width_as_recorded_arcsec", "half_width_arcsec"];
-        is_of_table.then(|| Beside {
-            torque_from_wind_up: serde_json::from_value(calibration["torque_from_wind_up"].take()).ok(),
-            has_delay: calibration["readings"].as_array().is_some_and(|readings| readings.iter().any(is_delay)),
-            load_with_output_angle: calibration["load_with_output_angle"].as_f64(),
-            half_widths_arcsec: half_widths.map(|name| calibration[name].as_f64().unwrap_or(f64::INFINITY)),
-        })
+        let read: CalibrationFile = serde_json::from_str(&text).ok()?;
+        (read.table_id == table.id().to_string()).then_some(read)
+    }
+
+    /// Whether a delay between the readings was taken out of its rows.
+    pub(crate) fn has_delay(&self) -> bool {
+        self.readings.iter().any(|reading| reading["name"] == DELAY)
     }
 }
 
