@@ -26,7 +26,7 @@ pub fn parse_known(
     if read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
         return Ok(read);
     }
-    check_degrees(&read, columns, nominal)?;
+    check_degrees(&mut read, columns, nominal)?;
     let torques: Vec<_> = read.sessions.iter().map(|session| session.torque_n_m.clone()).collect();
     let before = read.faults.len();
     check_torque(&mut read, nominal, table);
@@ -45,12 +45,11 @@ mod tests {
     use crate::synthesize::catalogue_drive;
     use flexspline_base::units::ARCSEC_PER_RAD;
 
-    /// A model shows that angles are in degrees, which is refused, and that a torque counts the other way, which is put
-    /// right; without one neither shows.
+    /// A model shows that a torque counts the other way, which is put right; without one it does not show.
     #[test]
-    fn angles_in_degrees_are_refused_and_a_turned_torque_is_put_right() {
+    fn a_turned_torque_is_put_right() {
         let nominal = catalogue_drive();
-        let log = |angle: f64, torque: f64| {
+        let log = |torque: f64| {
             let mut random = fastrand::Rng::with_seed(3);
             let mut flank = 1.0;
             let mut text = "time_s,generator_rad,output_rad,torque_n_m\n".to_owned();
@@ -64,20 +63,16 @@ mod tests {
                 let play = 0.5 * nominal.backlash_arcsec * flank;
                 let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + play + noise;
                 let output = psi / nominal.ratio + error / ARCSEC_PER_RAD;
-                text += &format!("{t:.2},{},{},{}\n", angle * psi, angle * output, torque * load);
+                text += &format!("{t:.2},{psi},{output},{}\n", torque * load);
             }
             text
         };
         let map = ColumnMap::default();
         let known = |log: String| parse_known("m.csv", log.as_bytes(), &map, &nominal, None).unwrap();
-        let right = known(log(1.0, 1.0));
+        let right = known(log(1.0));
         assert_eq!(right.faults, []);
         let by_ratio = |log: &str| parse_at_least(FEW, "m.csv", log.as_bytes(), &map, &nominal.gear()).unwrap();
-        let degrees = log(1f64.to_degrees(), 1.0);
-        assert_eq!(by_ratio(&degrees).faults, []);
-        let refused = parse_known("m.csv", degrees.as_bytes(), &map, &nominal, None).unwrap_err().to_string();
-        assert!(refused.contains("angles in degrees"), "{refused}");
-        let turned = log(1.0, -1.0);
+        let turned = log(-1.0);
         assert_eq!(by_ratio(&turned).faults, []);
         let read = known(turned);
         assert!(read.faults.len() == 1 && read.faults[0].what.contains("turned round"), "{:?}", read.faults);
@@ -85,30 +80,38 @@ mod tests {
         assert!(a.error_rad == b.error_rad && a.torque_n_m == b.torque_n_m);
     }
 
-    /// With the ratio alone the waves of the generator show degrees; a unit that is given is believed, and radians are
-    /// read.
+    /// With the ratio alone the waves of the generator show degrees; without any, an error too large is asked about. A
+    /// unit that is given is believed, and radians are read.
     #[test]
-    fn degrees_are_refused_by_the_waves_of_the_generator() {
-        let log = |unit: f64| {
+    fn degrees_are_refused_by_the_waves_of_the_generator_and_asked_about_without() {
+        let log = |unit: f64, wave: f64| {
             let mut text = "generator_rad,output_rad,torque_n_m\n".to_owned();
             for k in 0..9000 {
                 let psi = 0.08 * f64::from(k);
                 let load = 20.0 * (0.004 * f64::from(k)).sin();
-                let error = 15.0 * (2.0 * psi).sin() + 60.0 * (psi / 100.0).cos() + 2.0 * load;
+                let error = wave * (2.0 * psi).sin() + 60.0 * (psi / 100.0).cos() + 2.0 * load;
                 text += &format!("{},{},{load}\n", unit * psi, unit * (psi / 100.0 + error / ARCSEC_PER_RAD));
             }
             text
         };
         let nominal = crate::calibrate::Prior::of_ratio(100.0, flexspline_mechanics::drive::GeneratorKind::Cam).nominal;
-        let read = |map: &str, unit: f64| {
+        let read = |map: &str, unit: f64, wave: f64| {
             let map = if map.is_empty() { ColumnMap::default() } else { ColumnMap::parse(map).unwrap() };
-            parse_known("m.csv", log(unit).as_bytes(), &map, &nominal, None).map_err(|error| error.to_string())
+            let read = parse_known("m.csv", log(unit, wave).as_bytes(), &map, &nominal, None);
+            read.map(|read| read.notes.join("; ")).map_err(|error| error.to_string())
         };
-        assert!(read("", 1.0).is_ok());
-        let refused = read("", 1f64.to_degrees()).unwrap_err();
+        for wave in [15.0, 0.0] {
+            assert!(!read("", 1.0, wave).unwrap().contains("degrees"));
+        }
+        let refused = read("", 1f64.to_degrees(), 15.0).unwrap_err();
         assert!(refused.contains("degrees") && refused.contains("generator=generator_rad:deg"), "{refused}");
         let given = "generator=generator_rad:deg,output=output_rad:deg,torque=torque_n_m:N.m";
-        assert!(read(given, 1f64.to_degrees()).is_ok());
+        assert!(read(given, 1f64.to_degrees(), 15.0).is_ok());
+        let asked = read("", 1f64.to_degrees(), 0.0).unwrap();
+        for reading in ["generator=generator_rad:deg,output=output_rad:deg", "generator=generator_rad:rad"] {
+            assert!(asked.contains("in degrees") && asked.contains(reading), "{asked}");
+        }
+        assert!(!read(given, 1f64.to_degrees(), 0.0).unwrap().contains("degrees"));
     }
 
     /// Of thirty rows six have a time of their own in their order.

@@ -298,7 +298,7 @@ pub fn parse_rows(
         recording.notes.push(format!("the model holds {names} already; what is found is beyond that"));
     }
     let (nominal, table) = subject.against();
-    channels::check_degrees(&recording, columns, nominal)?;
+    channels::check_degrees(&mut recording, columns, nominal)?;
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
     if recording.unusable.is_none() {
         channels::take_friction(&mut recording, &mut subject.nominal, subject.table.as_ref());
