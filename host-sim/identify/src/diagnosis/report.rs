@@ -11,6 +11,11 @@ use crate::causes::{CauseName, ParameterName};
 use crate::extension::Evaluation;
 use crate::measurement::FaultName;
 
+/// A set of causes is open from this share of the likeliest's probability on. *Guess*.
+const OPEN: f64 = 0.5;
+/// Sets that are listed, at most. *Chosen*: a headline of four lines.
+const SHOWN: usize = 4;
+
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -227,7 +232,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// What was found about the unit.
     pub finding: Finding,
-    /// Causes, strongest first.
+    /// Causes, likeliest first.
     pub causes: Vec<Cause>,
     /// Sets of causes, likeliest first: each cause or what these data do not tell from it. Empty where none is named.
     pub posterior: Vec<SetOfCauses>,
@@ -317,6 +322,23 @@ impl Diagnosis {
         self.next_experiment = Some(format!("{advice}; then the same run again"));
     }
 
+    /// The sets of causes that the data do not decide between, with their odds; causes by `name`.
+    #[must_use]
+    pub fn open_between(&self, name: fn(CauseName) -> &'static str) -> Option<String> {
+        let least = OPEN * self.posterior.first()?.probability;
+        let of_set = |of: &SetOfCauses| {
+            let names: Vec<&str> = of.set.iter().map(|cause| name(*cause)).collect();
+            let names = if names.is_empty() { "none of the library".to_owned() } else { names.join(" with ") };
+            format!("{names} ({:.0} %)", 100.0 * of.probability)
+        };
+        let mut open: Vec<String> = self.posterior.iter().filter(|of| of.probability >= least).map(of_set).collect();
+        if let Some(more @ 1..) = open.len().checked_sub(SHOWN) {
+            open.truncate(SHOWN);
+            open.push(format!("{more} other sets"));
+        }
+        (open.len() > 1).then(|| format!("not decided between {}", open.join(", ")))
+    }
+
     /// A few lines for a terminal.
     #[must_use]
     pub fn text(&self) -> String {
@@ -329,7 +351,8 @@ impl Diagnosis {
             Verdict::Unknown => "a discrepancy that no known cause explains",
         };
         let _ = writeln!(text, "finding: {}", self.finding.words());
-        let _ = writeln!(text, "verdict: {verdict}");
+        let open = self.open_between(CauseName::as_str).map(|open| format!(", {open}")).unwrap_or_default();
+        let _ = writeln!(text, "verdict: {verdict}{open}");
         for cause in &self.causes {
             let _ = writeln!(
                 text,

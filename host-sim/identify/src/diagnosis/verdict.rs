@@ -137,7 +137,9 @@ pub(super) fn conclude(
             });
             effects.push(shares);
         }
-        causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
+        // As the odds are shown; of equal ones the larger first.
+        let odds = |cause: &Cause| (100.0 * cause.confidence).round();
+        causes.sort_by(|a, b| odds(b).total_cmp(&odds(a)).then(b.size_arcsec.total_cmp(&a.size_arcsec)));
     }
     // Of a cause that was asked about and not named: what would tell it from the strongest that is.
     let not_named = |asked: &CauseName| causes.iter().all(|cause| cause.name != *asked);

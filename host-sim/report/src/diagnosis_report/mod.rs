@@ -18,6 +18,7 @@ use super::page::{
     significant,
 };
 use flexspline_base::robust::least_and_most;
+use flexspline_design::stated;
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
 use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Unexplained, Verdict};
@@ -195,19 +196,23 @@ impl DiagnosisKnown<'_> {
         // No second percentage next to the confidence: the residuals prove the causes.
         let fell = |from: f64, to: f64| RichText::arcsec(from, 2).plain(" → ").error(to, 2);
         let (corrected, held) = (diagnosis.compensation, diagnosis.held_out);
-        // A table cannot correct every cause: what a sensor reads wrong the output does not do.
-        let corrects = corrected.rms_extended_tables_arcsec != corrected.rms_nominal_tables_arcsec;
-        let (share, share_is) = if corrected.is_known() && corrects {
-            let share = fell(corrected.rms_nominal_tables_arcsec, corrected.rms_extended_tables_arcsec);
-            (share, "left after correction, with the nominal table and with one that holds the causes")
-        } else {
-            (fell(held.rms_before_arcsec, held.rms_after_arcsec), "without the causes and with them")
+        let written = self.sources.table;
+        let (share, share_is) = match &written.file {
+            Some(file) if corrected.is_known() => {
+                let share = fell(corrected.rms_nominal_tables_arcsec, written.rms_left_out_arcsec);
+                (share, format!("left after correction, with the nominal table and with {file}"))
+            }
+            _ => (fell(held.rms_before_arcsec, held.rms_after_arcsec), "without the causes and with them".to_owned()),
         };
         let share_is = format!("rms in {}, {share_is}", self.left_out());
+        let explained = |how: &str| match diagnosis.open_between(CauseName::words) {
+            Some(open) => format!("{how}, {}.", open.replace(" %", "\u{a0}%")).into(),
+            None => listed(format!("{how} by ").into()),
+        };
         let departure = RichText::arcsec(self.departure_arcsec(), 2);
         let (answer, number, number_is) = match diagnosis.verdict {
-            Verdict::Explained => (listed("Explained by ".into()), share, share_is.as_str()),
-            Verdict::PartlyExplained => (listed("Partly explained by ".into()), share, share_is.as_str()),
+            Verdict::Explained => (explained("Explained"), share, share_is.as_str()),
+            Verdict::PartlyExplained => (explained("Partly explained"), share, share_is.as_str()),
             Verdict::Unknown if diagnosis.finding == Finding::DataUnusable => {
                 let why = self.sources.recording.unusable.as_deref();
                 let why = why.unwrap_or("their faults hide what the drive does");
@@ -306,7 +311,7 @@ impl DiagnosisKnown<'_> {
                 "Look-alikes",
             ];
             let rows = diagnosis.causes.iter().map(row).collect();
-            blocks.push(PageBlock::table("Causes, strongest first", &header, rows));
+            blocks.push(PageBlock::table("Causes, likeliest first", &header, rows));
             let does =
                 diagnosis.causes.iter().map(|of| format!("{}: {}.", words::begun(of.name.words()), of.name.does()));
             blocks.push(PageBlock::paragraph(does.collect::<Vec<_>>().join(" ")));
@@ -407,7 +412,7 @@ impl DiagnosisKnown<'_> {
             let place = waves.iter().position(|(_, other)| *other == name).filter(|_| known)?;
             let order = self.sources.nominal.harmonics[place / 2].order_per_generator_turn;
             let phase = if place % 2 == 0 { "in phase" } else { "a quarter before" };
-            Some((place, format!("Harmonic of order {}, {phase}", words::order(order))))
+            Some((place, format!("Harmonic of order {}, {phase}", stated::short(order))))
         };
         let mut rows: Vec<(usize, Vec<RichText>)> = recalibrated
             .iter()
@@ -443,8 +448,8 @@ impl DiagnosisKnown<'_> {
         } else {
             let row = |fault: &Fault| {
                 let when = match (fault.time_s, fault.until_s) {
-                    (Some(a), Some(b)) if b > a => format!("{} to {}", words::seconds(a), words::seconds(b)),
-                    (Some(a), _) => words::seconds(a),
+                    (Some(a), Some(b)) if b > a => format!("{a:.2} s to {b:.2} s"),
+                    (Some(a), _) => format!("{a:.2} s"),
                     _ => "–".into(),
                 };
                 let lines = if fault.last_line > fault.first_line {
@@ -500,11 +505,6 @@ impl DiagnosisKnown<'_> {
                  are displacements on the pitch circle.",
                 self.left_out()
             )),
-            PageBlock::paragraph(format!(
-                "A name is given only where a cause gains in {}, where no rival does as well, and where it is large \
-                 enough against noise and against how wrong its model may be. The rest is described and not named.",
-                self.left_out()
-            )),
         ])
     }
 }
@@ -543,7 +543,7 @@ mod tests {
 
     use super::*;
     use crate::page::{FigureBody, Span};
-    use flexspline_identify::diagnosis::report::{Compensation, HeldOut, Residual};
+    use flexspline_identify::diagnosis::report::{Compensation, HeldOut, Residual, SetOfCauses};
     use flexspline_identify::diagnosis::trace::Trace;
     use flexspline_identify::measurement::{FaultName, Measures, Treatment};
     use flexspline_identify::synthesize::catalogue_drive;
@@ -631,7 +631,11 @@ mod tests {
             recording: &recording,
             nominal: &nominal,
             diagnosis,
-            table: &WrittenTable::default(),
+            table: &WrittenTable {
+                file: Some("calibrated.fxt".into()),
+                rms_left_out_arcsec: 2.0,
+                ..WrittenTable::default()
+            },
             series: &rows.sessions.iter().map(series).collect::<Vec<_>>(),
             causes: Vec::new(),
             command: "flexspline diagnose",
@@ -693,7 +697,7 @@ mod tests {
             assert_eq!(stamps.contains(&status), status != Status::Good);
             assert!(faulty.remarks[1].contains("encoder index jump; the output jumps."), "{:?}", faulty.remarks);
         }
-        // What a joint would feel comes first where it was evaluated.
+        // What the written table gains comes first where it was evaluated, and what is open is said with its odds.
         let mut evaluated = diagnosis(Verdict::Explained, &[CauseName::Wear]);
         evaluated.compensation = Compensation {
             rms_uncompensated_arcsec: 20.0,
@@ -701,7 +705,12 @@ mod tests {
             rms_calibrated_table_arcsec: None,
             rms_extended_tables_arcsec: 3.0,
         };
-        assert_eq!(words(&page_of(&evaluated, Vec::new()).headlines[0].number), "8″ → 3″");
+        evaluated.posterior = [(vec![CauseName::Wear], 0.4), (vec![CauseName::Ratcheting], 0.3), (Vec::new(), 0.1)]
+            .map(|(set, probability)| SetOfCauses { set, probability })
+            .into();
+        let headline = page_of(&evaluated, Vec::new()).headlines.remove(0);
+        assert_eq!(words(&headline.number), "8″ → 2″");
+        assert_eq!(words(&headline.answer), "Explained, not decided between wear (40\u{a0}%), ratcheting (30\u{a0}%).");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::json;
 
-use crate::page::{RichText, significant};
+use crate::page::RichText;
 use flexspline_identify::diagnosis::report::{Cause, Parameter};
 
 /// The first letter made large.
@@ -47,17 +47,6 @@ pub(super) fn named(text: RichText, cause: &Cause) -> RichText {
         .plain(" rms)")
 }
 
-/// An order: four digits, whole ones without a point.
-pub(super) fn order(order: f64) -> String {
-    let text = significant(order, 4);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// A time, s.
-pub(super) fn seconds(time_s: f64) -> String {
-    format!("{time_s:.2} s")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,7 +56,6 @@ mod tests {
     fn lists_read_like_sentences() {
         let items: Vec<String> = ["a", "b", "c"].map(str::to_owned).into();
         assert_eq!((listed(&items[..1]).as_str(), listed(&items).as_str()), ("a", "a, b and c"));
-        assert_eq!((order(2.0).as_str(), order(1.978_9).as_str(), order(188.0).as_str()), ("2", "1.979", "188"));
         assert_eq!((begun("über").as_str(), of(&FaultName::ReadJitter).as_str()), ("Über", "read jitter"));
     }
 }
