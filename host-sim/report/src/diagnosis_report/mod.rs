@@ -7,7 +7,6 @@
 
 mod picture;
 mod thin;
-mod why;
 mod words;
 
 use rayon::prelude::*;
@@ -109,7 +108,7 @@ impl DiagnosisKnown<'_> {
         let (status, also) = self.status();
         let [picture, pictures @ ..] = self.picture_sections();
         let mut sections: Vec<PageSection> = self.causes().into_iter().chain([picture, self.next()]).collect();
-        sections.extend([self.gain(), self.before_and_after(), why::in_short(diagnosis)]);
+        sections.extend([self.gain(), self.before_and_after()]);
         sections.extend(pictures);
         sections.extend([self.data(), self.reading()]);
         let teeth = nominal
