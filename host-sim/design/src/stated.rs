@@ -553,6 +553,15 @@ pub fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn torques_are_written_as_they_are_meant() {
+        for (torque, text) in [(0.05_f32, "0.05"), (200.0, "200"), (-0.021, "-0.021"), (12.345_67, "12.35"), (0.0, "0")]
+        {
+            assert_eq!(short(torque.into()), text);
+        }
+    }
+
     use flexspline_mechanics::mesh::MeshLevel;
     use flexspline_mechanics::stepping::Method;
 

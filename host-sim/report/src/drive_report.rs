@@ -16,7 +16,7 @@ use super::page::{
 };
 use flexspline_base::robust::{least_and_most, rms};
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_design::stated::TWO_SETS_OF_K;
+use flexspline_design::stated::{TWO_SETS_OF_K, short};
 use flexspline_design::tables::validate::{MAX_BOUND_ARCSEC, Point, Validation};
 use flexspline_design::tables::{Source, TableInfo};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -61,15 +61,6 @@ pub struct DriveSources<'a> {
 /// The load at which a drive is shown in motion: half of what its table spans.
 pub fn shown_torque_n_m(table: &Table<'_>) -> f64 {
     0.5 * f64::from(table.torque_range_n_m()[1])
-}
-
-/// A torque to four digits: those of single precision are not all meant.
-fn torque_text(torque_n_m: f32) -> String {
-    let torque = f64::from(torque_n_m);
-    let unit = 10_f64.powf(torque.abs().max(1e-9).log10().floor() - 3.0);
-    let digits = (-unit.log10().round()).max(0.0) as usize;
-    let text = format!("{:.digits$}", (torque / unit).round() * unit);
-    if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
 }
 
 /// A subject with what is derived from it.
@@ -160,7 +151,7 @@ impl<'a> DriveKnown<'a> {
         let name = self.subject.kind.in_words();
         let uncorrected = format!(
             "Uncorrected, the {name} drive is off by up to {{}} at {} N·m; ",
-            torque_text(self.subject.table.torque_range_n_m()[1])
+            short(self.subject.table.torque_range_n_m()[1].into())
         );
         let headline = if let Some(v) = self.subject.validation {
             let answer = format!(
@@ -178,7 +169,7 @@ impl<'a> DriveKnown<'a> {
                 RichText::arcsec(worst, 2),
                 format!(
                     "largest miss at {FRAMES} FEM points that made no table ({} N·m, {:.0} °C, forward)",
-                    torque_text(shown_torque_n_m(&self.subject.table) as f32),
+                    short(shown_torque_n_m(&self.subject.table)),
                     self.temperature
                 ),
             )
@@ -212,12 +203,12 @@ impl<'a> DriveKnown<'a> {
                     let angle = self.position(k);
                     [angle.to_degrees(), self.error(angle, torque, self.temperature, direction) - mean]
                 });
-                let name = format!("{} N·m {word}", torque_text(torque));
+                let name = format!("{} N·m {word}", short(torque.into()));
                 lines.series.push(ChartSeries::new(name, mark, colour, points.collect()));
             }
         }
         if let Ok(animation) = &self.subject.animation {
-            let name = format!("{} N·m forward, fresh FEM", torque_text(animation.torque_n_m as f32));
+            let name = format!("{} N·m forward, fresh FEM", short(animation.torque_n_m));
             lines.series.push(ChartSeries::new(name, Mark::Points, 1, less_mean(animation)));
         }
         lines
@@ -274,7 +265,7 @@ impl<'a> DriveKnown<'a> {
             RichText::arcsec(plays.fold(0.0, f64::max), 3),
             RichText::arcsec(wind_up, 3),
             RichText::arcsec(high - low, 2),
-            RichText::new(torque_text(highest)),
+            RichText::new(short(highest.into())),
             RichText::new(self.subject.table.id().to_string()),
         ]
     }
@@ -474,7 +465,7 @@ fn stress_section(known: &[DriveKnown<'_>]) -> Option<PageSection> {
             [vec![RichText::new(stress.place.in_words())], numbers.into(), vec![RichText::new(safety)]].concat()
         });
         let [_, highest] = k.subject.table.torque_range_n_m();
-        let caption = format!("Largest von Mises stress under {} N·m, over three meshes", torque_text(highest));
+        let caption = format!("Largest von Mises stress under {} N·m, over three meshes", short(highest.into()));
         let header = ["Place", "stress, MPa", "from, MPa", "to, MPa", "safety against fatigue"];
         Some(PageBlock::table(caption, &header, rows.collect()).of_choice(k.id()))
     };
@@ -614,7 +605,7 @@ fn table_section(known: &[DriveKnown<'_>]) -> PageSection {
     for k in known {
         let table = &k.subject.table;
         let [cold, warm] = table.temperature_range_c();
-        let [low, high] = table.torque_range_n_m().map(torque_text);
+        let [low, high] = table.torque_range_n_m().map(|torque| short(torque.into()));
         let arcsec = |rad: f32| RichText::arcsec(f64::from(rad) * ARCSEC_PER_RAD, 2);
         let mut rows = vec![
             ("Range of the load", format!("{low} to {high} N·m").into()),
@@ -651,17 +642,4 @@ fn reading_section() -> PageSection {
              drive of figure 1.",
         ),
     ])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn torques_are_written_as_they_are_meant() {
-        for (torque, text) in [(0.05_f32, "0.05"), (200.0, "200"), (-0.021, "-0.021"), (12.345_67, "12.35"), (0.0, "0")]
-        {
-            assert_eq!(torque_text(torque), text);
-        }
-    }
 }
