@@ -141,7 +141,9 @@ pub fn wind_up_parts(
         let empirical = beside_fem(torque_n_m) - beside_fem(touch);
         Ok([loaded? - touched? - empirical, empirical])
     };
-    let ([teeth, _], [cup, _], [balls, empirical]) = (wind_up(&bare)?, wind_up(&no_balls)?, wind_up(drive)?);
+    let (teeth, (cup, balls)) =
+        rayon::join(|| wind_up(&bare), || rayon::join(|| wind_up(&no_balls), || wind_up(drive)));
+    let ([teeth, _], [cup, _], [balls, empirical]) = (teeth?, cup?, balls?);
     let whole = balls + empirical;
     let parts = [
         ("teeth and rim", teeth),

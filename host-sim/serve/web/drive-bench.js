@@ -392,7 +392,7 @@ export async function driveBench(view, asked, bench) {
   }
 
   async function sheet(drive, g, mine) {
-    const job = await run({ work: "sheet", drive, generator: g, torque_n_m: null }, wantedBy(mine));
+    const job = await run({ work: "sheet", drive, generator: g }, wantedBy(mine));
     running.delete(job.id);
     if (mine !== round || job.state !== "done") return null;
     const columns = Object.entries(csvColumns(await fileText(`${job.out}/sweep.csv`)));
@@ -414,18 +414,19 @@ export async function driveBench(view, asked, bench) {
     }
     const [drive, torque, generators] = [request(), now.torque, [...now.generators]];
     found = new Map(generators.map((g) => [g, {}]));
-    // All of them at once, the coarse ones first: the server's line says how many run at a time.
-    const meshes = ["coarse", "standard"].map((mesh) => [
-      mesh,
-      generators.map((g) => pitch(drive, g, torque, mesh, mine).catch((error) => ({ failed: error.message }))),
-    ]);
-    for (const [mesh, runs] of meshes) {
+    // The coarse ones first, on all cores; the server's line says how many run at a time.
+    for (const mesh of ["coarse", "standard"]) {
+      const runs = generators.map((g) =>
+        pitch(drive, g, torque, mesh, mine).catch((error) => ({ failed: error.message })),
+      );
       for (const [k, run] of runs.entries()) {
         live.textContent = `${generators[k]}: contact FEM, ${mesh} mesh …`;
         const result = await run;
         if (!result || mine !== round) return;
         Object.assign(found.get(generators[k]), result);
         const sheetOf = result.summary?.data_sheet;
+        // What a data sheet states was computed with the pitch: nothing of it is asked for again.
+        if (sheetOf) found.get(generators[k]).sheet = { figures: { ...sheetOf.sheet, ...sheetOf.loads } };
         if (!hasSheet && sheetOf?.beside.some((b) => b.figure === "k1_n_m_per_rad")) {
           hasSheet = true;
           largestLoad = sheetOf.stated.rated_torque_n_m;
@@ -438,7 +439,7 @@ export async function driveBench(view, asked, bench) {
       document.documentElement.dataset[mesh] = `${mine} ${ms}`;
       live.textContent = `${mesh} mesh, ${(ms / 1000).toFixed(1)} s`;
     }
-    for (const g of generators) {
+    for (const g of generators.filter((name) => !found.get(name).sheet)) {
       live.textContent = `${g}: stiffness K1 to K3 …`;
       const of = await sheet(drive, g, mine);
       if (mine !== round) return;
