@@ -57,21 +57,6 @@ pub struct DriveAsked {
     pub sets: BTreeMap<String, String>,
 }
 
-/// How the columns of logs are read.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ColumnReading {
-    /// `--columns`.
-    #[serde(default)]
-    pub columns: Option<String>,
-    /// `--rate`, Hz.
-    #[serde(default)]
-    pub rate_hz: Option<f64>,
-    /// `--torque-constant`, N·m for an ampere.
-    #[serde(default)]
-    pub torque_constant: Option<f64>,
-}
-
 /// Knowledge of a unit before it is measured: one of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -100,23 +85,19 @@ pub enum WorkAsked {
     Calibrate {
         /// The logs.
         files: Vec<String>,
-        /// How they are read.
-        reading: ColumnReading,
+        /// `--columns`.
+        columns: Option<String>,
         /// Knowledge of the unit.
         known: KnownOfUnit,
-        /// The generator that the table is marked with.
-        generator: GeneratorKind,
     },
     /// Difference of a log from the simulation, and its causes.
     Diagnose {
         /// The log.
         file: String,
-        /// How it is read.
-        reading: ColumnReading,
+        /// `--columns`.
+        columns: Option<String>,
         /// Knowledge of the unit: a model or tables.
         known: KnownOfUnit,
-        /// The generator of the tables.
-        generator: GeneratorKind,
         /// Causes that are not considered.
         #[serde(default)]
         without: Vec<String>,
@@ -125,8 +106,8 @@ pub enum WorkAsked {
     Replay {
         /// The log.
         file: String,
-        /// How it is read.
-        reading: ColumnReading,
+        /// `--columns`.
+        columns: Option<String>,
         /// The table image.
         table: String,
     },
@@ -147,8 +128,6 @@ pub enum WorkAsked {
         drive: DriveAsked,
         /// The generator.
         generator: GeneratorKind,
-        /// Rated load, N·m.
-        torque_n_m: Option<f64>,
     },
     /// Tables of a drive.
     Tables {
@@ -209,11 +188,6 @@ pub enum NewOf {
         teeth: u32,
         /// Module, mm.
         module_mm: f64,
-        /// Bore, mm.
-        #[serde(default)]
-        bore_mm: Option<f64>,
-        /// The generator that it is drawn for.
-        generator: GeneratorKind,
     },
 }
 
@@ -259,29 +233,27 @@ impl WorkAsked {
                 words.logs(files)?;
                 words.word("--json");
             }
-            WorkAsked::Calibrate { files, reading, known, generator } => {
+            WorkAsked::Calibrate { files, columns, known } => {
                 words.logs(files)?;
                 words.word("--split");
                 words.known(known, true)?;
-                words.option("generator", generator);
-                words.reading(reading)?;
+                words.columns(columns)?;
             }
-            WorkAsked::Diagnose { file, reading, known, generator, without } => {
+            WorkAsked::Diagnose { file, columns, known, without } => {
                 words.file("file", file)?;
                 words.known(known, false)?;
-                words.option("generator", generator);
                 for cause in without {
                     if without.len() > MOST_SETS || !cause.chars().all(|c| c.is_ascii_lowercase() || c == '_') {
                         return refuse("without", cause, "names of causes");
                     }
                     words.option("without", cause);
                 }
-                words.reading(reading)?;
+                words.columns(columns)?;
             }
-            WorkAsked::Replay { file, reading, table } => {
+            WorkAsked::Replay { file, columns, table } => {
                 words.file("file", file)?;
                 words.file_option("tables", table)?;
-                words.reading(reading)?;
+                words.columns(columns)?;
             }
             WorkAsked::Simulate { drive, generator, torque_n_m, mesh } => {
                 words.drive(drive)?;
@@ -294,10 +266,9 @@ impl WorkAsked {
                     words.option("increment", std::f64::consts::TAU / f64::from(teeth) / FIRST_LOOK);
                 }
             }
-            WorkAsked::Sheet { drive, generator, torque_n_m } => {
+            WorkAsked::Sheet { drive, generator } => {
                 words.sheet(drive)?;
                 words.option("generator", generator);
-                words.number("torque-n-m", *torque_n_m)?;
                 words.option("positions", 4);
             }
             WorkAsked::Tables { drive, generator, mesh, torque_n_m, complete } => {
@@ -337,11 +308,9 @@ impl WorkAsked {
                 match of {
                     NewOf::Like(name) if is_plain(name) => words.option("like", name),
                     NewOf::Like(name) => return refuse("like", name, "SERIES-SIZE-RATIO, for instance CSG-25-80"),
-                    NewOf::Numbers { teeth, module_mm, bore_mm, generator } => {
+                    NewOf::Numbers { teeth, module_mm } => {
                         words.option("teeth", teeth);
                         words.number("module", Some(*module_mm))?;
-                        words.number("bore", *bore_mm)?;
-                        words.option("generator", generator);
                     }
                 }
             }
@@ -429,12 +398,9 @@ impl CommandLine<'_> {
         }
     }
 
-    fn reading(&mut self, reading: &ColumnReading) -> Result<(), WorkError> {
-        if let Some(columns) = reading.columns.as_deref().filter(|columns| !columns.is_empty()) {
-            self.text("columns", columns)?;
-        }
-        self.number("rate", reading.rate_hz)?;
-        self.number("torque-constant", reading.torque_constant)
+    fn columns(&mut self, columns: &Option<String>) -> Result<(), WorkError> {
+        let columns = columns.iter().filter(|columns| !columns.is_empty());
+        columns.into_iter().try_for_each(|columns| self.text("columns", columns))
     }
 
     fn drive_itself(&mut self, drive: &DriveAsked) -> Result<(), WorkError> {
@@ -516,19 +482,19 @@ mod tests {
     #[test]
     fn a_request_is_one_command_line() {
         let words = asked(
-            r#"{"work":"calibrate","files":["a.csv"],"generator":"cam","known":{"ratio":-100},
-                "reading":{"columns":"generator=#1:turn,error=it's:arcsec","rate_hz":100}}"#,
+            r#"{"work":"calibrate","files":["a.csv"],"known":{"ratio":-100},
+                "columns":"generator=#1:turn,error=it's:arcsec"}"#,
         )
         .unwrap();
         assert_eq!(
             shown(&words, "bench/x-1"),
-            "flexspline calibrate a.csv --split --ratio=-100 --generator=cam \
-             '--columns=generator=#1:turn,error=it'\\''s:arcsec' --rate=100 --out=bench/x-1"
+            "flexspline calibrate a.csv --split --ratio=-100 '--columns=generator=#1:turn,error=it'\\''s:arcsec' \
+             --out=bench/x-1"
         );
         let words = asked(r#"{"work":"look","files":["a.csv"]}"#).unwrap();
         assert_eq!(shown(&words, "bench/x-1"), "flexspline look a.csv --json > bench/x-1/look.json");
         let words = asked(
-            r#"{"work":"sheet","generator":"cam","torque_n_m":null,
+            r#"{"work":"sheet","generator":"cam",
                 "drive":{"drive":"HHD-95","sets":{"generator.w0_mm":"0.49","flexspline.width_mm":"20"}}}"#,
         )
         .unwrap();
@@ -547,7 +513,7 @@ mod tests {
             assert!(found.is_err(), "{name}: {found:?}");
         }
         let columns = "x' --out=/ ; rm -rf /";
-        let json = format!(r#"{{"work":"replay","file":"a.csv","table":"a.csv","reading":{{"columns":{columns:?}}}}}"#);
+        let json = format!(r#"{{"work":"replay","file":"a.csv","table":"a.csv","columns":{columns:?}}}"#);
         let words = asked(&json).unwrap();
         assert_eq!(words.arguments.iter().filter(|word| word.starts_with("--out")).count(), 1);
         assert!(words.arguments.contains(&format!("--columns={columns}")));
@@ -559,8 +525,8 @@ mod tests {
             r#"{"work":"new","file":"x.toml","of":{"like":"--force"}}"#,
             r#"{"work":"simulate","drive":{"drive":"../x"},"generator":"cam","torque_n_m":1,"mesh":"coarse"}"#,
             r#"{"work":"samples","file":"a.csv","drive":{"drive":"HHD-95","sets":{"a --b":"1"}},"generator":"cam"}"#,
-            r#"{"work":"diagnose","file":"a.csv","reading":{},"known":{"ratio":50},"generator":"cam"}"#,
-            r#"{"work":"replay","file":"a.csv","table":"a.csv","reading":{"columns":"a\nb"}}"#,
+            r#"{"work":"diagnose","file":"a.csv","known":{"ratio":50}}"#,
+            r#"{"work":"replay","file":"a.csv","table":"a.csv","columns":"a\nb"}"#,
         ] {
             assert!(asked(bad).is_err(), "{bad}");
         }

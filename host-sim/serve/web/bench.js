@@ -138,11 +138,7 @@ async function start(view) {
           moduleLabel,
           button(
             "Draw it",
-            () =>
-              make(
-                { numbers: { teeth: Number(teeth.value), module_mm: Number(module.value), generator: "cam" } },
-                free("drive"),
-              ),
+            () => make({ numbers: { teeth: Number(teeth.value), module_mm: Number(module.value) } }, free("drive")),
             { class: "of-form" },
           ),
         ),

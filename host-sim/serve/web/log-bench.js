@@ -490,7 +490,7 @@ ${Number(now.drag) ? `friction_torque_n_m = ${Number(now.drag)}\n` : ""}`;
     draw();
     await Promise.all(
       now.files.map(async (file) => {
-        const work = { work: "diagnose", file, reading, known, generator: "cam", without: [...now.without] };
+        const work = { work: "diagnose", file, ...reading, known, without: [...now.without] };
         const job = file === now.files[0] && firstJob ? firstJob : await mine(work, at, () => undefined);
         if (!job || at !== round) return;
         if (job.state !== "done") rows.set(file, [file, why(job), "–", "–", "–"]);
@@ -526,7 +526,7 @@ ${Number(now.drag) ? `friction_torque_n_m = ${Number(now.drag)}\n` : ""}`;
           : Number(now.teeth) && !missing().length
             ? { model: await modelOfFigures() }
             : { ratio: Number(now.ratio) };
-    const work = { work: "calibrate", files: now.files, reading, known, generator: "cam" };
+    const work = { work: "calibrate", files: now.files, ...reading, known };
     const asked = JSON.stringify(work);
     if (made.asked !== asked) {
       forget();
@@ -567,12 +567,7 @@ ${Number(now.drag) ? `friction_torque_n_m = ${Number(now.drag)}\n` : ""}`;
       table(
         "Parts of the table",
         ["Part", "Verdict", "Size", "Why"],
-        c.parts.map((p) => [
-          p.name.replaceAll("_", " "),
-          p.kept ? "kept" : "refused",
-          errorOf(p.size_arcsec),
-          p.why,
-        ]),
+        c.parts.map((p) => [p.name.replaceAll("_", " "), p.kept ? "kept" : "refused", errorOf(p.size_arcsec), p.why]),
       ),
       downloads(job.out, [
         ["calibrated.fxt", "the table of this unit, for firmware"],
@@ -618,7 +613,7 @@ ${Number(now.drag) ? `friction_torque_n_m = ${Number(now.drag)}\n` : ""}`;
     firstJob = null;
     compared.replaceChildren();
     both.figure.hidden = true;
-    const work = { work: "diagnose", file: now.files[0], reading, known, generator: "cam", without: [...now.without] };
+    const work = { work: "diagnose", file: now.files[0], ...reading, known, without: [...now.without] };
     const progress = el("div", { role: "status" });
     verdict.replaceChildren(progress);
     const job = await mine(work, at, (j) => progress.replaceChildren(progressOf(j)));

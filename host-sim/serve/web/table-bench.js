@@ -88,7 +88,7 @@ export async function tableBench(view, asked, bench) {
         if (job.state === "done") map = (await fileJson(`${job.out}/look.json`)).columns_option ?? "";
         columns.value = map;
       }
-      const job = await run({ work: "replay", file: file.value, table: name, reading: { columns: map } }, (j) =>
+      const job = await run({ work: "replay", file: file.value, table: name, columns: map }, (j) =>
         place.replaceChildren(progressOf(j)),
       );
       if (job.state !== "done") {

@@ -85,11 +85,7 @@ fn what_a_command_prints_and_says_is_kept() {
 #[test]
 fn a_command_that_fails_says_why() {
     let bench = Bench::new();
-    let work = WorkAsked::Replay {
-        file: "a.csv".into(),
-        reading: crate::work::ColumnReading::default(),
-        table: "a.csv".into(),
-    };
+    let work = WorkAsked::Replay { file: "a.csv".into(), columns: None, table: "a.csv".into() };
     let id = bench.jobs.add(work).unwrap().id;
     let job = bench.until(id, JobStatus::Failed);
     assert_eq!((job.exit_code, job.said.as_slice()), (Some(2), ["error: no".to_owned()].as_slice()));
