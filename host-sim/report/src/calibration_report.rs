@@ -59,15 +59,12 @@ fn headline(c: &Calibration) -> Headline {
 
 fn left(made: &Calibrated) -> PageSection {
     let c = &made.calibration;
-    let row = |name: &str, arcsec: f64| vec![RichText::new(name), RichText::arcsec(arcsec, 3)];
     let measured = if c.has_delay() { "As measured less the delay" } else { "As measured" };
-    let rows = vec![
-        row(&format!("{measured}, rows in steady motion"), c.held_out.rms_before_arcsec),
-        row("With the prior model, held out", c.held_out.rms_prior_arcsec),
-        row("With the table, held out", c.held_out.rms_after_arcsec),
-        row(&format!("{measured}, all rows"), c.core.rms_before_arcsec),
-        row("Residual with this table in the core, all rows", c.core.rms_after_arcsec),
-    ];
+    let header = [measured, "Prior model, held out", "Table, held out", "All rows", "All rows, table in the core"];
+    let (held, core) = (c.held_out, c.core);
+    let of_held = [held.rms_before_arcsec, held.rms_prior_arcsec, held.rms_after_arcsec];
+    let rms = of_held.into_iter().chain([core.rms_before_arcsec, core.rms_after_arcsec]);
+    let rows = vec![rms.map(|arcsec| RichText::arcsec(arcsec, 3)).collect()];
     let every = made.shown.len().div_ceil(MOST_POINTS).max(1);
     let series = |name, colour, at: usize| {
         let points = made.shown.iter().step_by(every).map(|row| [row[0] / std::f64::consts::TAU, row[at]]);
@@ -80,7 +77,7 @@ fn left(made: &Calibrated) -> PageSection {
         [ChartAxis::new("Output", PageQuantity::Turn), ChartAxis::new("Error", PageQuantity::Error)],
         Lines::of(vec![series("measured", 0, 1), series("residual", 1, 2)]).for_every_choice(),
     );
-    let table = PageBlock::table("Error and residual, root mean square", &["Of", "Error"], rows);
+    let table = PageBlock::table("Error, root mean square", &header, rows);
     PageSection::new("left", "Residual", vec![table, figure])
 }
 
