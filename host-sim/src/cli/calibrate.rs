@@ -207,7 +207,9 @@ impl Calibrate {
             report::write(&calibration_report::page(&made), out, &mut outputs)?;
         }
         outputs.finish()?;
-        context.print(&made.calibration, || text(&made, out, !self.no_report) + &say::next(&self.next(out)))
+        let table = quoted(&out.join("calibrated.fxt").display().to_string());
+        let next = say::next(&[format!("flexspline replay --tables {table} ANOTHER.log")]);
+        context.print(&made.calibration, || text(&made, out, !self.no_report) + &next)
     }
 
     /// Says what to record.
@@ -240,12 +242,6 @@ impl Calibrate {
         }
         let prior = Prior::of_given_ratio(self.ratio.unwrap_or_default(), self.generator);
         prior.map(|prior| (prior, None)).map_err(bad_input)
-    }
-
-    /// How the table is tried on another log.
-    fn next(&self, out: &Path) -> Vec<String> {
-        let table = quoted(&out.join("calibrated.fxt").display().to_string());
-        vec![format!("flexspline replay --tables {table} ANOTHER.log")]
     }
 }
 
@@ -311,9 +307,6 @@ fn held(c: &Calibration) -> String {
             " at the speed recorded, ±{:.2} at another, as a delay between the readings would look like backlash here",
             c.half_width_at_another_pace_arcsec
         );
-    }
-    if c.has_delay() {
-        text += "; of both angles at one instant: the delay between the readings comes on top";
     }
     text
 }

@@ -228,9 +228,6 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     }
     let _ = writeln!(text, "{}", extension.table.text());
     text += &diagnosis.text();
-    for left in extension.compensation.iter().flat_map(|evaluation| &evaluation.not_applied) {
-        let _ = writeln!(text, "not in the tables: {}, {}", left.cause, left.reason);
-    }
     for field in &extension.drive_fields {
         let _ = writeln!(text, "extended drive: {field}");
     }
