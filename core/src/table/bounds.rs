@@ -51,8 +51,8 @@ impl Bounds {
     pub(crate) const NONE: Self =
         Self { error_rad: 0.0, periodic_rad: 0.0, slope: 0.0, curve_slope: 0.0, ripple_cells: 0.0, rounding_rad: 0.0 };
 
-    /// Iterations that an inverse takes, 1 to 24, and what they and rounding leave; `cell_rad` is a cell of the ripple at
-    /// the output.
+    /// Iterations that an inverse takes, 1 to 24, and what they and rounding leave; `cell_rad` is a cell of the ripple
+    /// at the output.
     pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
         let rough = self.curve_slope / (1.0 - self.slope);
         let usual = self.iterated(USUAL_ITERATIONS, rough, [self.periodic_rad * rough, 1.0 + rough, 0.0], cell_rad);
@@ -95,7 +95,7 @@ bits_of!(InverseBound { iterations, error_rad });
 mod tests {
     use super::*;
 
-    /// Each iteration leaves 0.45 / 0.95 of the error: ten come below a ten-millionth; and nine tenths: the last ends it.
+    /// Each iteration leaves 0.45 / 0.95 of the error, and ten are enough; or nine tenths, and the last ends it.
     #[test]
     fn an_inverse_of_steep_waves_takes_more_iterations_up_to_the_most() {
         let steep = Bounds { periodic_rad: 1e-4, slope: 0.5, curve_slope: 0.45, ..Bounds::NONE };

@@ -631,6 +631,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     toothless[106..108].fill(0);
     flexspline::testing::reseal(&mut toothless);
     vectors.image(&toothless)?;
+    // A wind-up that no number holds between its nodes.
+    vectors.image(&moved(&tables::BASES[2], [2, 1, 0], 1e30))?;
     for _ in 0..ticks / 40 {
         vectors.encoder(40, &mut mixed)?;
     }

@@ -489,7 +489,6 @@ mod tests {
             ("flexspline", "teeth = 187", "found 187, allowed: an even number"),
             ("flexspline", "teeth = 188.0", "found 188.0, allowed: a whole number, 20 to 2000"),
             ("flexspline", "teeth = 4", "found 4, allowed: 20 to 2000"),
-            ("flexspline", "teeth = -188", "found -188, allowed: 20 to 2000"),
             ("circular_spline", "teeth = 192", "found 192, allowed: 190, two more"),
             ("flexspline", "module_mm = \"0.5 mm\"", "found \"0.5 mm\", allowed: 0.05 to 10"),
             (
@@ -528,11 +527,6 @@ mod tests {
             ("generator", "w0_mm = 3.0", "found 3, allowed: up to 2.3638"),
             ("generator", "roller_diameter_mm = 40", "40 mm is too large for the four-roller generator"),
             ("generator", "four_roller_angle_deg = 41", "found 41, allowed: 15 to 38"),
-            (
-                "generator",
-                "friction_coefficient = 0.1",
-                "unknown key; did you mean `flanks.friction_coefficient`?; allowed: w0_mm",
-            ),
             ("generator", "bearing_stiffness_n_per_mm3 = 0", "found 0, allowed: above 0"),
             (
                 "generator",
@@ -567,23 +561,8 @@ mod tests {
             ),
             (
                 "as_built",
-                "flexspline_pitch_harmonics = [{ order = 2.5, amplitude_um = 1.0 }]",
-                "[0].order: found 2.5, allowed: a whole number, 1 to 1000",
-            ),
-            (
-                "as_built",
                 "flexspline_pitch_harmonics = [{ order = 2, amplitude_um = 1 }, { order = 95, amplitude_um = 1 }]",
                 "[1].order: found 95, allowed: 1 to 94 (two teeth",
-            ),
-            (
-                "as_built",
-                "flexspline_pitch_harmonics = [{ order = 2, amplitude_um = -1.0 }]",
-                "[0].amplitude_um: found -1, allowed: 0 to 100",
-            ),
-            (
-                "as_built",
-                "flexspline_pitch_harmonics = [{ order = 2, amplitude_um = nan }]",
-                "[0].amplitude_um: found NaN, allowed: 0 to 100",
             ),
             ("as_built", "flexspline_pitch_harmonics = [{ order = 2 }]", "[0].amplitude_um: missing"),
             (
@@ -606,16 +585,6 @@ mod tests {
                 "as_built",
                 "damaged_teeth = [{ wheel = \"flexspline\", tooth = 188, depth_um = 1 }]",
                 "[0].tooth: found 188, allowed: 0 to 187",
-            ),
-            (
-                "as_built",
-                "damaged_teeth = [{ wheel = \"flexspline\", tooth = 1, flank = \"left\", depth_um = 1 }]",
-                "[0].flank: found \"left\", allowed: \"plus\", \"minus\", \"both\"",
-            ),
-            (
-                "sleeve",
-                "kind = \"bellows\"",
-                "found \"bellows\", allowed: \"hermetic\", \"cup\", \"hat\", \"springs\", \"none\"",
             ),
             (
                 "sleeve",
@@ -659,10 +628,6 @@ mod tests {
             (
                 "[sleeve]\nkind = \"cup\"\nlateral_stiffness_n_per_mm = 500",
                 "wrong.toml:4: sleeve.lateral_stiffness_n_per_mm: found 500, allowed with kind = \"cup\": 0",
-            ),
-            (
-                "[sleeve]\nkind = \"none\"\nlateral_stiffness_n_per_mm = 500",
-                "wrong.toml:4: sleeve.lateral_stiffness_n_per_mm: found 500, allowed with kind = \"none\": 0",
             ),
             (
                 "[sleeve]\nkind = \"none\"\ntorsion_stiffness_n_m_per_rad = 4.6e5",
