@@ -35,7 +35,6 @@ use crate::measurement::{
 use crate::misfit::LEAVES;
 use crate::parts::{self, usual_arcsec};
 pub use crate::parts::{PartName, Scales, State};
-use crate::residual::{is_no_noise, strongest};
 pub use at_rest::{LoopFigure, TorqueLoop};
 use flexspline_base::robust::{dot, rms};
 use flexspline_base::statistics::mean;
@@ -942,8 +941,7 @@ impl Fitted {
             "{what}, so no table is better than none ({rms_before_arcsec:.2} arcsec rms as measured, \
              {rms_after_arcsec:.2} with the table)"
         );
-        let degrees = in_degrees(files).filter(|_| no_part);
-        apart.into_iter().chain(torque).chain(degrees).for_each(|said| text += &format!("\n  {said}"));
+        apart.into_iter().chain(torque).for_each(|said| text += &format!("\n  {said}"));
         let parts = self.judged(recorded, prior);
         parts.iter().for_each(|part| text += &format!("\n  {}: {}", part.name, part.why));
         Err(CalibrationError::NothingGained(text))
@@ -1052,32 +1050,6 @@ fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
 
 /// What a change of the torque winds up, of a lag that undoes it. *Guess*.
 const ALIKE: std::ops::Range<f64> = 0.5..2.0;
-/// Waves that repeat every 360 of an angle's units, within this share of a wave, say that these are degrees. *Guess*:
-/// the order of a line is known far better in some turns.
-const WHOLE_WAVES: f64 = 0.02;
-/// They are looked for up to this order of the angle, of which 360 units would have 28 waves. *Guess*.
-const HIGHEST_OF_DEGREES: f64 = 0.5;
-
-/// Asks whether the generator's angle is in degrees, where the error has a line that repeats every 360 of its units. No
-/// size is changed by that.
-fn in_degrees(files: &[Recording]) -> Option<String> {
-    let all = |of: fn(&Session) -> &Vec<f64>| -> Vec<f64> {
-        files.iter().flat_map(|file| &file.sessions).flat_map(of).copied().collect()
-    };
-    let (angle, error) = (all(|session| &session.generator_rad), all(|session| &session.error_rad));
-    let middle = mean(&error);
-    let about: Vec<f64> = error.iter().map(|error| error - middle).collect();
-    let (order, power) = strongest(&angle, &about, 0.0, HIGHEST_OF_DEGREES)?;
-    let waves = order.to_degrees();
-    let whole = waves.round() >= 1.0 && (waves - waves.round()).abs() < WHOLE_WAVES;
-    (whole && is_no_noise(power, error.len())).then(|| {
-        format!(
-            "the error has {waves:.0} waves in 360 units of the generator's angle: if these are degrees, say \
-             generator=NAME:deg and output=NAME:deg in --columns"
-        )
-    })
-}
-
 /// Notes for the user of the table.
 fn remarks(
     prior: &Prior<'_>,
