@@ -46,6 +46,7 @@ enum {
     MOST_PERIODIC_NODES = 128,
     NODE_WORDS = 3,
     USUAL_ITERATIONS = 8,
+    MORE_ITERATIONS = 16,
     MOST_ITERATIONS = 24,
     HOLD_COUNTS = 8
 };
@@ -1352,42 +1353,38 @@ static bool check_curve(check *is, uint32_t index)
     return true;
 }
 
-/* What at most `most` iterations of the inverse and rounding leave, and how many they are; as in the core. */
-static float iterated(const check *is, uint32_t most, float rate, const float away_by[3], uint32_t *iterations)
-{
-    const float cell_rad =
-        is->ripple_nodes == 0u ? float_of(0x7f800000u) : rad_of(magnitude(is->table->cell_width));
-    float left = is->periodic_rad, away = is->cells * cell_rad + away_by[0];
-    *iterations = 0;
-    while (*iterations < most) {
-        const float beyond = larger(away - cell_rad, 0.0f);
-        left = left * rate + beyond;
-        away = left * away_by[1] + beyond * away_by[2];
-        (*iterations)++;
-        if (left <= 1.0e-7f) {
-            break;
-        }
-    }
-    const float place = is_finite(cell_rad) ? 4.0f * FLT_EPSILON * cell_rad : 0.0f;
-    return left + (is->rounding_rad + place) / (1.0f - is->slope);
-}
-
-/* Iterations of the inverse and what they leave; the words that say so. */
+/* Iterations of the inverse and what they leave, by the rougher bound or, where that does not do, by the other, as in the core; the words
+   that say so. */
 static bool check_inverse(check *is)
 {
-    uint32_t iterations;
-    const float rough = is->curve_slope / (1.0f - is->slope);
-    const float usual[3] = {is->periodic_rad * rough, 1.0f + rough, 0.0f};
-    float left = iterated(is, USUAL_ITERATIONS, rough, usual, &iterations);
-    if (!(left <= 1.0e-6f)) {
-        const float ripple = is->slope - is->curve_slope, rate = is->curve_slope / (1.0f - ripple);
-        const float steep[3] = {0.0f, ripple * (1.0f + rate), 1.0f + ripple};
-        left = iterated(is, MOST_ITERATIONS, rate, steep, &iterations);
+    fxt_table *table = is->table;
+    const float cell_rad = is->ripple_nodes == 0u ? float_of(0x7f800000u) : rad_of(magnitude(table->cell_width));
+    const float place = is_finite(cell_rad) ? 4.0f * FLT_EPSILON * cell_rad : 0.0f;
+    const float ripple = is->slope - is->curve_slope;
+    float left = 1.0f;
+    uint32_t iterations = 0;
+    for (uint32_t most = USUAL_ITERATIONS; most <= (uint32_t)MOST_ITERATIONS && !(left <= 1.0e-6f); most += MORE_ITERATIONS) {
+        const bool steep = most > (uint32_t)USUAL_ITERATIONS;
+        const float rate = is->curve_slope / (1.0f - (steep ? ripple : is->slope));
+        const float of_left = steep ? ripple * (1.0f + rate) : 1.0f + rate, of_beyond = steep ? 1.0f + ripple : 0.0f;
+        float away = is->cells * cell_rad + (steep ? 0.0f : is->periodic_rad * rate);
+        left = is->periodic_rad;
+        iterations = 0;
+        while (iterations < most) {
+            const float beyond = larger(away - cell_rad, 0.0f);
+            left = left * rate + beyond;
+            away = left * of_left + beyond * of_beyond;
+            iterations++;
+            if (left <= 1.0e-7f) {
+                break;
+            }
+        }
+        left = left + (is->rounding_rad + place) / (1.0f - is->slope);
     }
     if (!(left <= 1.0e-6f)) {
         return refuse(is, FXT_INVERSE, FXT_NO_FIELD, 0, 0);
     }
-    is->table->inverse_error_rad = left;
+    table->inverse_error_rad = left;
     const double left_counts = counts_of_rad((double)number_within(left, 0.0f, 1.0e-6f));
     const uint32_t hold = to_u32(left_counts) + (uint32_t)HOLD_COUNTS;
     return derived_is(is, AT_ITERATIONS, iterations) && derived_is(is, AT_HOLD, hold);

@@ -68,6 +68,7 @@ impl Bounds {
     /// before it. The solution for A, B, C held fixed is off the place where it is looked for by no more than the
     /// ripple and the first of `away` at first, then by these multiples of the error and of what the last search fell
     /// short.
+    #[inline(never)]
     fn iterated(self, most: u8, rate: f32, away: [f32; 3], cell_rad: f32) -> InverseBound {
         let [first_rad, of_error, of_short] = away;
         let mut bound = InverseBound { iterations: 0, error_rad: self.periodic_rad };
