@@ -234,15 +234,21 @@ fn another_pace_back_is_no_second_pace_and_play_is_found() {
     assert!((unloaded.value_arcsec.unwrap() + 20.0).abs() < 0.5, "{unloaded:?}");
 }
 
-/// A bench that sets the output to zero anew before each session of a log, and not: zeros of their own, and one.
+/// A bench that sets the output to zero anew before each session of a log, and not: zeros of their own, and one; also
+/// where springs slip under the load.
 #[test]
 fn sessions_that_were_set_to_zero_anew_have_zeros_of_their_own() {
     let law = |psi: f64, _: f64, torque: f64, way: f64| 20.0 * (2.0 * psi).sin() + 1.5 * torque - 12.0 * way;
-    for zeros in [[0.0, 80.0, -60.0, 130.0], [0.0; 4]] {
+    let all: [&[f64]; 3] = [&[0.0, 80.0, -60.0, 130.0], &[0.0; 4], &[0.0, 35.0, 25.0, -70.0, -105.0, -80.0]];
+    for (zeros, loop_arcsec) in all.into_iter().zip([0.0, 0.0, 15.0]) {
         let mut log = recording(1, law);
-        let session = |(seed, zero): (u64, f64)| {
+        let session = |(seed, zero): (u64, &f64)| {
             let mut session = recording(seed, law).sessions.remove(0);
-            session.error_rad.iter_mut().for_each(|error| *error += zero / ARCSEC_PER_RAD);
+            let mut held = 0.0_f64;
+            for (torque, error) in session.torque_n_m.iter().flatten().zip(&mut session.error_rad) {
+                held = held.clamp(torque - 8.0, torque + 8.0);
+                *error += (zero + loop_arcsec * (held - torque) / 8.0) / ARCSEC_PER_RAD;
+            }
             session
         };
         log.sessions = (1..).zip(zeros).map(session).collect();
@@ -251,11 +257,16 @@ fn sessions_that_were_set_to_zero_anew_have_zeros_of_their_own() {
         let found = c.readings.iter().filter(|reading| reading.name == OFFSET).map(|reading| reading.value);
         let found: Vec<f64> = found.collect();
         let (anew, first) = (zeros[1] != 0.0, found[0]);
-        assert_eq!((found.len(), c.files.len()), (if anew { 4 } else { 1 }, 1), "{:?}", c.notes);
-        assert!(found.iter().zip(zeros).all(|(found, zero)| (found - first - zero).abs() < 0.5), "{found:?}");
+        assert_eq!((found.len(), c.files.len()), (if anew { zeros.len() } else { 1 }, 1), "{:?}", c.notes);
+        let most = 0.5 + 0.2 * loop_arcsec;
+        assert!(found.iter().zip(zeros).all(|(found, zero)| (found - first - zero).abs() < most), "{found:?}");
         assert_eq!(c.notes.iter().any(|note| note == SET_ANEW), anew, "{:?}", c.notes);
         let torque = c.torque_from_wind_up.as_ref().unwrap();
-        assert!(c.held_out.rms_after_arcsec < 2.5 && torque.rms_n_m < 1.6, "{:?} {torque:?}", c.held_out);
+        assert!(
+            c.held_out.rms_after_arcsec < 2.5 + loop_arcsec && torque.rms_n_m < 1.6 + loop_arcsec,
+            "{:?} {torque:?}",
+            c.held_out
+        );
         let table = Table::check(&made.table.image).unwrap();
         let on_one = crate::replay::on_own_zeros(&table, on_zero_of(&table, log), 20.0);
         let means = on_one.sessions.iter().map(|session| session.error_rad.iter().sum::<f64>() / session.len() as f64);
@@ -375,9 +386,6 @@ fn noise_makes_no_table_and_lone_parts_no_others() {
     for seed in 0..6 {
         let nothing = calibrate(&[recording(seed, |_, _, _, _| 0.0)], &prior);
         assert!(matches!(nothing, Err(CalibrationError::NothingGained(_))), "seed {seed}");
-        let degrees = [recording(seed, |psi, _, _, _| 8.0 * (20.0 * psi.to_radians()).sin())];
-        let asked = [nothing, calibrate(&degrees, &prior)].map(|made| made.map(|_| ()).unwrap_err().to_string());
-        assert!(!asked[0].contains("in 360") && asked[1].contains("20 waves in 360"), "seed {seed}: {asked:?}");
         let one = calibrate(&[recording(seed, |psi, _, _, _| 8.0 * (2.0 * psi).sin())], &prior).unwrap();
         assert_eq!(kept(&one.calibration), ["generator_angle"], "seed {seed}");
     }

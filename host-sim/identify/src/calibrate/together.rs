@@ -152,8 +152,10 @@ impl Starts {
     /// so is seen by what a fit to both logs leaves; else the waves say what they can.
     pub(super) fn of(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>, files: &[Recording]) -> Option<Starts> {
         let parts = recorded.shown(PartName::ALL, prior);
-        let pair =
-            |log: usize| LogPair { rows: rows.of_logs([0, log]), log, parts: &parts, scales: &recorded.scales, prior };
+        let pair = |log: usize| {
+            let (rows, one_file) = (rows.of_logs([0, log]), files[log].file == files[0].file);
+            LogPair { rows, log, one_file, parts: &parts, scales: &recorded.scales, prior }
+        };
         let begins = |log: usize| files[log].sessions.first().map_or(0.0, |session| session.zero_off_rad);
         let first = Start { zero_rad: Some([0.0; 2]), output_turns: 0.0 };
         let logs = if files.len() > MOST_LOGS { 1 } else { files.len() };
@@ -214,6 +216,8 @@ impl Starts {
 struct LogPair<'a> {
     rows: Rows,
     log: usize,
+    /// Whether both are of one file: then the generator hardly counts whole turns anew.
+    one_file: bool,
     parts: &'a [PartName],
     scales: &'a Scales,
     prior: &'a Prior<'a>,
@@ -313,7 +317,7 @@ impl LogPair<'_> {
             let [found, _] = search.close_to(coarse, step / FINE_STEPS);
             // A curve that hardly goes beyond a turn tells no turns.
             let in_a_turn = within(found, TAU);
-            let tells_turns = search.squares(in_a_turn) > OTHER_TURN * search.squares(found);
+            let tells_turns = !self.one_file && search.squares(in_a_turn) > OTHER_TURN * search.squares(found);
             if tells_turns { within(found, repeats) } else { in_a_turn }
         })
     }
