@@ -488,7 +488,6 @@ mod tests {
         let fields: &[(&str, &str, &str)] = &[
             ("flexspline", "teeth = 187", "found 187, allowed: an even number"),
             ("flexspline", "teeth = 188.0", "found 188.0, allowed: a whole number, 20 to 2000"),
-            ("flexspline", "teeth = 4", "found 4, allowed: 20 to 2000"),
             ("circular_spline", "teeth = 192", "found 192, allowed: 190, two more"),
             ("flexspline", "module_mm = \"0.5 mm\"", "found \"0.5 mm\", allowed: 0.05 to 10"),
             (
@@ -496,7 +495,6 @@ mod tests {
                 "module = 0.5",
                 "unknown key; did you mean `flexspline.module_mm`?; allowed: teeth, module_mm",
             ),
-            ("flexspline", "profile_shift = nan", "found NaN, allowed: -2 to 10"),
             ("flexspline", "width_mm = inf", "found inf, allowed: above 0 to 1000"),
             ("flexspline", "width_mm = 0", "found 0, allowed: above 0 to 1000"),
             ("flexspline", "pressure_angle_deg = 0.349", "found 0.349, allowed: 10 to 35"),
@@ -507,11 +505,8 @@ mod tests {
                 "found 48.96: with w0_mm = 0.5 the tip would stand in the circular-spline root",
             ),
             ("flexspline", "rim_thickness_mm = 12", "found 12, allowed: up to 9.575"),
-            ("flexspline", "rim_thickness_mm = -1.2", "found -1.2, allowed: above 0"),
             ("flexspline", "root_fillet_mm = 0.3", "0.3 mm does not fit: the root land would be -"),
             ("flexspline", "tip_rounding_mm = 0.4", "0.4 mm does not fit: the tooth would be -"),
-            ("flexspline", "tip_rounding_mm = 0.001", "found 0.001, allowed: 0.002 to 5"),
-            ("circular_spline", "root_fillet_mm = 0.3", "0.3 mm does not fit"),
             ("circular_spline", "tip_radius_mm = 49.6", "found 49.6, allowed: below root_radius_mm = 49.45"),
             (
                 "circular_spline",
@@ -522,7 +517,6 @@ mod tests {
             ("circular_spline", "module_mm = 0.6", "found 0.6, allowed: within 1 % of the flexspline's 0.5"),
             ("material", "poissons_ratio = 0.5", "found 0.5, allowed: 0 to 0.49"),
             ("material", "youngs_modulus_gpa = 206", "unknown key; did you mean `material.youngs_modulus_mpa`?"),
-            ("material", "youngs_modulus_mpa = 2.06e11", "found 206000000000, allowed: 100 to 1e6"),
             ("generator", "w0_mm = 0.05", "found 0.05: with the two-roller generator the tips meet at the minor axis"),
             ("generator", "w0_mm = 3.0", "found 3, allowed: up to 2.3638"),
             ("generator", "roller_diameter_mm = 40", "40 mm is too large for the four-roller generator"),
@@ -541,8 +535,6 @@ mod tests {
             ("temperature", "flexspline_expansion_per_k = 11.5", "found 11.5, allowed: -0.00001 to 0.0001"),
             ("as_built", "flexspline_runout_um = -1", "found -1, allowed: 0 to 100"),
             ("as_built", "flexspline_wear_um = inf", "found inf, allowed: 0 to 200"),
-            ("as_built", "flexspline_runout_mm = 0.01", "unknown key; did you mean `as_built.flexspline_runout_um`?"),
-            ("as_built", "circular_spline_ovality_phase_deg = 400", "found 400, allowed: -360 to 360"),
             (
                 "as_built",
                 "flexspline_pitch_error_um = [1.0, 2.0]",
@@ -553,11 +545,6 @@ mod tests {
                 "as_built",
                 "flexspline_pitch_error_um = 3.0",
                 "found 3.0, allowed: an array of numbers, -100 to 100 each",
-            ),
-            (
-                "as_built",
-                "flexspline_pitch_harmonics = [{ order = 0, amplitude_um = 1.0 }]",
-                "[0].order: found 0, allowed: 1 to 1000",
             ),
             (
                 "as_built",
@@ -593,7 +580,6 @@ mod tests {
                  `hermetic`?",
             ),
             ("sleeve", "flange = 2", "found 2, allowed: \"rigid\", \"diaphragm\""),
-            ("sleeve", "wall_mm = 0", "found 0, allowed: above 0 to 100"),
         ];
         // Other bodies, and the start of the whole message.
         let others: &[(&str, &str)] = &[
@@ -630,21 +616,12 @@ mod tests {
                 "wrong.toml:4: sleeve.lateral_stiffness_n_per_mm: found 500, allowed with kind = \"cup\": 0",
             ),
             (
-                "[sleeve]\nkind = \"none\"\ntorsion_stiffness_n_m_per_rad = 4.6e5",
-                "wrong.toml:4: sleeve.torsion_stiffness_n_m_per_rad: found 460000, allowed with kind = \"none\": \
-                 \"rigid\"",
-            ),
-            (
                 "[sleeve]\nkind = \"cup\"\nbottom = \"plate\"\nbottom_thickness_mm = 20",
                 "wrong.toml:5: sleeve.bottom_thickness_mm: found 20, allowed: up to 9.4550",
             ),
             (
                 "[sleeve]\nkind = \"cup\"\nbottom = \"plate\"\nhub_radius_mm = 47",
                 "wrong.toml:5: sleeve.hub_radius_mm: found 47, allowed: up to 44.9112 (inside the tube)",
-            ),
-            (
-                "[sleeve]\nkind = \"hat\"\nflange = \"diaphragm\"\ndiaphragm_thickness_mm = 10",
-                "wrong.toml:5: sleeve.diaphragm_thickness_mm: found 10, allowed: up to 9.4550 (a thin plate)",
             ),
             ("sleeve = 4.6e5", "wrong.toml:2: sleeve: found 4.6e5, allowed: a table [sleeve]"),
             ("name = 95", "wrong.toml:2: name: found 95, allowed: a string"),
