@@ -198,8 +198,11 @@ impl DiagnosisKnown<'_> {
         let written = self.sources.table;
         let (share, share_is) = match &written.file {
             Some(file) if corrected.is_known() => {
-                let share = fell(corrected.rms_nominal_tables_arcsec, written.rms_left_out_arcsec);
-                (share, format!("left after correction, with the nominal table and with {file}"))
+                let (nominal, left) = (corrected.rms_nominal_tables_arcsec, written.rms_left_out_arcsec);
+                // A nominal table that was fitted to these rows is no measure.
+                let none = (corrected.rms_uncompensated_arcsec, "without a table");
+                let (before, without) = if left < nominal { (nominal, "with the nominal table") } else { none };
+                (fell(before, left), format!("left after correction, {without} and with {file}"))
             }
             _ => (fell(held.rms_before_arcsec, held.rms_after_arcsec), "without the causes and with them".to_owned()),
         };
