@@ -726,8 +726,7 @@ await check("a link opens its generator at its figure", async () => {
     const heading = await page.locator("h1").textContent();
     const number = await page.locator(".number strong").first().textContent();
     // What the table that is written gains.
-    const before = diagnosis.extension.compensation.rms_nominal_tables_arcsec;
-    const after = diagnosis.table.rms_left_out_arcsec;
+    const { rms_nominal_tables_arcsec: before, rms_calibrated_table_arcsec: after } = diagnosis.compensation;
     const twoDigits = (v) => `${v.toFixed(Math.max(0, 1 - Math.floor(Math.log10(v))))}″`;
     const due = `${twoDigits(before)} → ${twoDigits(after)}`;
     assert(heading.startsWith("Explained by eccentricity of the output encoder ("), heading);
