@@ -625,8 +625,7 @@ fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<Vec<Recording>> {
     let rows = settled(&anew, prior, &recorded);
     let counts = (0..anew.len()).map(|log| rows.rows.iter().filter(|row| row.at.log == log).count());
     // One that a lost index cuts short is no reason against the others.
-    let in_short: usize = counts.filter(|count| *count < FEWEST_ROWS).sum();
-    let long = in_short as f64 <= BOTH_WAYS * rows.rows.len() as f64;
+    let long = counts.filter(|count| *count < FEWEST_ROWS).sum::<usize>() as f64 <= BOTH_WAYS * rows.rows.len() as f64;
     let left = |rows: &Rows| zero::left_beside_load(rows, recorded.scales.friction_n_m);
     (long && left(&rows) < LEAVES * left(&settled(files, prior, &recorded))).then_some(anew)
 }

@@ -559,30 +559,32 @@ pub(crate) fn check_degrees(
         return Ok(());
     }
     let rows = Rows::new(&recording.sessions, nominal);
-    let output = columns.column(Quantity::Output).0;
+    let (degree, output) = (1f64.to_radians(), columns.column(Quantity::Output).0);
     let readings = vec![
         format!("--columns generator={generator}:deg,output={output}:deg"),
         format!("--columns generator={generator}:rad,output={output}:rad if they are not"),
     ];
-    let degree = 1f64.to_radians();
-    let places = sample(&rows);
-    let wound: Vec<f64> = rows.torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
-    let load = [&rows.torque, &wound, &PlayLaw::Held.flanks(&rows, &rows.torque, nominal)].map(|of| at(&places, of));
-    let waves_to = |most: i32, unit: f64, angle| {
-        (1..=most).flat_map(|order| waves(unit * f64::from(order), angle, &places)).collect::<Vec<_>>()
+    // Left beside waves of the wheels in radians and in degrees.
+    let beside_waves = || -> [f64; 2] {
+        let places = sample(&rows);
+        let wound: Vec<f64> = rows.torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
+        let load = [&rows.torque, &wound, &PlayLaw::Held.flanks(&rows, &rows.torque, nominal)];
+        let waves_to = |most: i32, unit: f64, angle| {
+            (1..=most).flat_map(|order| waves(unit * f64::from(order), angle, &places)).collect::<Vec<_>>()
+        };
+        let of_output = [waves_to(ORDERS[0], 1.0, &rows.output), waves_to(ORDERS[1], degree, &rows.output)].concat();
+        let any = floating(&rows, &places).into_iter().chain(load.map(|of| at(&places, of))).chain(of_output);
+        let free = FreeSpan::default().beyond(any);
+        let error = free.freed(at(&places, &rows.error));
+        [1.0, degree].map(|unit| {
+            let wheels = [&rows.on_flexspline, &rows.on_circular_spline];
+            let waves = wheels.into_iter().flat_map(|wheel| waves_to(ORDERS[1], unit, wheel));
+            robust_std(free.beyond(waves).freed(error.clone()).into_iter())
+        })
     };
-    let of_output = waves_to(ORDERS[0], 1.0, &rows.output).into_iter().chain(waves_to(ORDERS[1], degree, &rows.output));
-    let free = FreeSpan::default().beyond(floating(&rows, &places).into_iter().chain(load).chain(of_output));
-    let error = free.freed(at(&places, &rows.error));
-    let left = |unit: f64| {
-        let wheels = [&rows.on_flexspline, &rows.on_circular_spline];
-        let waves = wheels.into_iter().flat_map(|wheel| waves_to(ORDERS[1], unit, wheel));
-        robust_std(free.beyond(waves).freed(error.clone()).into_iter())
-    };
-    let (radians, degrees) = (left(1.0), left(degree));
     let (from, to) = least_and_most(rows.generator.iter().copied());
-    let turns = (to - from) * degree >= MANY_TURNS * TAU;
-    if turns && degrees.powi(2) < LEAVES * radians.powi(2) && radians >= ROUND_OFF_ARCSEC {
+    let [radians, degrees] = if (to - from) * degree >= MANY_TURNS * TAU { beside_waves() } else { [0.0; 2] };
+    if degrees.powi(2) < LEAVES * radians.powi(2) && radians >= ROUND_OFF_ARCSEC {
         let seen = format!(
             "with load and waves of the output, waves of {generator} to 2 pi have a residual of {radians:.0} arcsec, \
              to 360 {degrees:.0}"
