@@ -713,7 +713,6 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let FitOfLogs { files, delays, zeros, prior, alignment, recorded, fitted, made, said } = fit;
     let parts = fitted.judged(recorded, prior);
     let agreement = fitted.agreement();
-    let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
     let Fitted { rows, folds, model, held_out, .. } = fitted;
     let torque_from_wind_up = WindUpTorque::of(&rows, &folds, &model, prior).filter(|_| recorded.has_torque);
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
@@ -725,7 +724,7 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(said);
     notes.extend(delay);
-    notes.extend(agreement.and_then(|agreement| agreement.note(files)).into_iter().chain(unlike));
+    notes.extend(agreement.and_then(|agreement| agreement.note(files)));
     notes.extend(remarks(prior, recorded, files, &model, play_of_a_millisecond_arcsec));
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;

@@ -320,24 +320,6 @@ fn logs_that_do_not_agree_are_told_and_the_odd_one_named() {
     let turned = recording(5, |psi, out, torque, way| eccentric(psi - turns, out - turns / RATIO, torque, way));
     let turned = said(&[recording(1, eccentric), turned], "is not the same in all logs").unwrap();
     assert!(turned.contains("(+30.00 turns)"), "{turned}");
-    // A torque in pound-inches, at loads that are others but in the digits of a unit.
-    let steady = |log: &Recording, loads: [f64; 2]| {
-        let mut log = log.clone();
-        let session = &mut log.sessions[0];
-        let torque = session.torque_n_m.as_mut().unwrap();
-        for (row, torque) in torque.iter_mut().enumerate() {
-            let load = loads[row % 1000 / 500];
-            session.error_rad[row] += 1.5 * (load - *torque) / ARCSEC_PER_RAD;
-            *torque = load;
-        }
-        log
-    };
-    let held = [steady(&agree[0], [-20.0, 20.0]), steady(&agree[1], [-60.0, 60.0])];
-    assert_eq!(said(&held, "another unit"), None);
-    let mut pounds = steady(&agree[1], [-20.0, 20.0]);
-    pounds.sessions[0].torque_n_m.as_mut().unwrap().iter_mut().for_each(|torque| *torque *= 8.85);
-    let said = said(&[held[0].clone(), pounds], "another unit").unwrap();
-    assert!(said.contains("times less"), "{said}");
 }
 
 /// A fit is not judged at loads that it has not seen: each log at others is no fold.

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
+use super::Model;
 use super::folds::{Chosen, Folds, LEAST_GAIN, PENALTIES, Row};
 use super::interval::OF_95;
 use super::parts::{PartName, Scales, State};
@@ -11,8 +12,7 @@ use super::prior::Prior;
 use super::reading::Reading;
 use super::rows::{Recorded, Rows};
 use super::zero::{PhaseSearch, thinned, within};
-use super::{Model, SAME_TORQUE};
-use crate::measurement::{Recording, least_and_most};
+use crate::measurement::Recording;
 use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -77,36 +77,6 @@ impl Agreement {
             )
         })
     }
-}
-
-/// The straight wind-up of one log is this multiple of that of another: beyond what a spring of teeth stiffens by from
-/// light loads to heavy ones, 1.8 times in the catalogue (K1 to K3 of CSF-25-100). A guess.
-const OTHER_SLOPE: f64 = 3.0;
-
-/// Says of logs whose loads wind the drive up unlike: one curve fits them all where their loads are others, as one is
-/// in another unit.
-pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files: &[Recording]) -> Option<String> {
-    let most = model.scales.torque_n_m.iter().fold(0.0, |most: f64, load| most.max(load.abs()));
-    let slopes = (0..files.len()).filter_map(|log| {
-        let of_log = rows.rows.iter().filter(|row| row.at.log == log).map(|row| row.at.torque_n_m);
-        let (low, high) = least_and_most(of_log);
-        let slope = (model.under_arcsec(high, prior) - model.under_arcsec(low, prior)) / (high - low);
-        (high - low > SAME_TORQUE * most && slope > 0.0).then_some((log, slope))
-    });
-    let mut slopes: Vec<(usize, f64)> = slopes.collect();
-    slopes.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let (stiff, soft) = (slopes.first()?, slopes.last()?);
-    (soft.1 > OTHER_SLOPE * stiff.1).then(|| {
-        format!(
-            "the loads of the logs do not agree: {:.3} arcsec for a newton-metre in {}, {:.3} in {}, {:.1} times less; \
-             is the torque of one in another unit? See `flexspline look`, or give one log alone",
-            soft.1,
-            files[soft.0].file,
-            stiff.1,
-            files[stiff.0].file,
-            soft.1 / stiff.1
-        )
-    })
 }
 
 /// A generator that is turned back by what its waves say has to leave less than this share of the squares, … *Guess*.
