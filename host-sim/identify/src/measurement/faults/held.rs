@@ -10,7 +10,6 @@
 //! make. Where the column goes from one step to the next the load is halfway between them: a curve through these
 //! points, within half a step of what is written, stands in. A load that is put on in steps is left alone here, too.
 
-use std::collections::HashSet;
 use std::ops::Range;
 
 use super::resolution::lattice;
@@ -126,14 +125,6 @@ fn goes_on_between(log: &Log, runs: &[Range<usize>]) -> bool {
 
 /// Steps of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
 const LEAST_STEP: f64 = 0.004;
-/// Steps are those of a sensor, and not weights that somebody put on and wrote down, if there are this many of them, …
-/// *Guess*: nobody writes down as many weights.
-const MANY_STEPS: usize = 12;
-/// … and this share of the runs of one value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*:
-/// weights that are put on by hand are not torn.
-const TORN: f64 = 0.2;
-/// Rows to a step at least on either side of a change that is looked at. *Guess*: fewer give no level.
-const LEAST_ROWS: usize = 3;
 /// A change by more steps than this is by more than one. *Source*: derived, half way between one step and two.
 const MORE_THAN_ONE: f64 = 1.5;
 /// Changes to and fro between the same two steps within this many rows are one, which noise has torn. *Guess*.
@@ -152,24 +143,11 @@ pub(in crate::measurement) fn check_coarse_torque(log: &mut Log, findings: &mut 
     let torque = log.of(Quantity::Torque);
     // A session of few loads shows a multiple of the step.
     let Some(step) = log.pieces(torque).filter_map(lattice).min_by(f64::total_cmp) else { return };
-    if step < LEAST_STEP * largest_torque(log) {
+    // Steps that the error makes, too, are those of the load.
+    if step < LEAST_STEP * largest_torque(log) || !goes_on_between(log, &log.runs(torque, 1, |a, b| a == b)) {
         return;
     }
     let fault = log.fault(FaultName::Quantisation, 0..log.len());
-    let levels = log.runs(torque, 1, |a, b| a == b);
-    if !goes_on_between(log, &levels) {
-        let torn = levels.iter().filter(|rows| rows.len() < LEAST_ROWS).count();
-        let steps: HashSet<i64> = torque.iter().map(|torque| (torque / step).round() as i64).collect();
-        // Else nothing shows that they are those of a sensor.
-        let of_a_sensor = steps.len() >= MANY_STEPS && (torn as f64) >= TORN * levels.len() as f64;
-        findings.add(fault.filter(|_| of_a_sensor), Quantity::Torque, Treatment::Kept, |_| {
-            format!(
-                "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and \
-                 nothing in the rows tells it"
-            )
-        });
-        return;
-    }
     let known = stretches(log, torque, step);
     let pairs = known.iter().flat_map(|known| known.windows(2));
     let mut lasting: Vec<f64> = pairs.map(|pair| pair[1].0 - pair[0].0).collect();
@@ -317,25 +295,6 @@ mod tests_of_a_coarse_torque {
 
     fn on(sessions: &mut [Session], findings: &mut Findings) {
         Log::on(sessions, |log| check_coarse_torque(log, findings));
-    }
-
-    #[test]
-    fn steps_of_a_sensor_are_named_where_the_load_is_put_on_and_weights_are_not() {
-        let mut random = fastrand::Rng::with_seed(2);
-        let mut levels = Vec::new();
-        (0..60).for_each(|_| levels.push(25.0 * (2.0 * random.f64() - 1.0)));
-        // Put on within three rows.
-        let load = |t: f64| {
-            let (at, since) = ((t as usize).min(58), (t.fract() / 0.03).min(1.0));
-            levels[at] + since * (levels[at + 1] - levels[at])
-        };
-        let mut findings = Findings::default();
-        on(&mut sessions(1.0, load, load), &mut findings);
-        let fault = findings.faults.pop().expect("a fault");
-        assert_eq!((fault.name, fault.treatment), (FaultName::Quantisation, Treatment::Kept));
-        let weights = |t: f64| levels[(t as usize).min(59)].round();
-        on(&mut sessions(1.0, weights, weights), &mut findings);
-        assert!(findings.faults.is_empty());
     }
 
     #[test]
