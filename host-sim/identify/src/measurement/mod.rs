@@ -36,10 +36,13 @@ pub use reader::{Layout, Separator, Sheet, raw};
 pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 pub(crate) use unit::Family;
 
+use crate::least_squares::FreeSpan;
 use faults::Findings;
 use log::Log;
 use raw::RawFile;
 
+/// What is left of a load is noise where it is no more than this of that from row to row. *Guess*.
+const NOISE_ALONE: f64 = 1.2;
 /// More sessions than a person makes. *Guess*.
 const MANY_SESSIONS: usize = 50;
 
@@ -290,11 +293,25 @@ pub(crate) fn parse_at_least(
     faults::outliers::check(&mut log, gear, &mut findings);
     faults::resolution::check(&mut log, gear, &mut findings);
     let mut sessions = log.into_sessions();
+    sessions.iter_mut().for_each(|session| load_without_noise(session, gear.ratio));
     // Each session of a guide log, whose columns nobody maps, has its own zero.
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= columns.is_empty());
     let Findings { mut faults, notes, .. } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, notes, unusable: None })
+}
+
+/// A load that is one, or what the angle of the output and the way of a motion make of it, as a weight does, is that
+/// alone where all else of it is noise: a fit would take that noise for what tells a wind-up from waves of the output.
+fn load_without_noise(session: &mut Session, ratio: f64) {
+    let Some(torque) = &mut session.torque_n_m else { return };
+    let wave = |of: fn(f64) -> f64| session.generator_rad.iter().map(|psi| of(psi / ratio)).collect();
+    let one = FreeSpan::default().beyond([vec![1.0; torque.len()]]);
+    let of_angle = [wave(f64::sin), wave(f64::cos), directions(&session.generator_rad)];
+    let rests = [one.freed(torque.clone()), one.beyond(of_angle).freed(one.freed(torque.clone()))];
+    if let Some(noise) = rests.iter().find(|rest| rms(rest) < NOISE_ALONE * white_noise([&rest[..]])) {
+        torque.iter_mut().zip(noise).for_each(|(torque, noise)| *torque -= noise);
+    }
 }
 
 /// Mends clock and holes of a log and leaves out the rows without an angle; how many had which angle.
