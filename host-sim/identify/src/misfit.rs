@@ -38,8 +38,7 @@ pub(crate) fn explained(table: &Table<'_>, rows: &[MeasuredRow], has_delay: bool
     let wave = |of: fn(f64) -> f64| column(&|row| of(row.generator_rad / ratio));
     let (as_it_stands, torque) = (residual(1.0), column(&|row| row.torque_n_m));
     let waves = [wave(|_| 1.0), wave(f64::sin), wave(f64::cos)];
-    let beside = FreeSpan::default().beyond(waves.clone()).freed(torque.clone());
-    let goes_with_angle = about_mean(&beside) < (1.0 - TURNS_WITH_THE_OUTPUT.powi(2)).sqrt() * about_mean(&torque);
+    let goes_with_angle = correlation(&torque, &waves) > TURNS_WITH_THE_OUTPUT;
     let without_delay = FreeSpan::default().beyond([waves[0].clone(), pace.clone()]).freed(as_it_stands.clone());
     let span = FreeSpan::default().beyond(waves.into_iter().chain([torque, pace]));
     let other_load = span.freed(without_delay.clone());
@@ -51,6 +50,12 @@ pub(crate) fn explained(table: &Table<'_>, rows: &[MeasuredRow], has_delay: bool
         clearly_less(&other_load, &without_delay).filter(|_| goes_with_angle),
         clearly_less(&without_delay, &as_it_stands),
     ]
+}
+
+/// Correlation of a load with what waves make of it, a constant among them, 0 to 1.
+pub(crate) fn correlation(load: &[f64], waves: &[Vec<f64>]) -> f64 {
+    let beside = FreeSpan::default().beyond(waves.to_vec()).freed(load.to_vec());
+    (1.0 - (about_mean(&beside) / about_mean(load)).powi(2)).max(0.0).sqrt()
 }
 
 /// Root mean square about the mean.

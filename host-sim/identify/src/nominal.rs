@@ -28,10 +28,8 @@ const FARTHEST_WIND_UP_RAD: f64 = 0.02;
 const STEPS_OF_A_PITCH: u32 = 16;
 /// Places over an output turn that waves of a table are fitted to. *Guess*: dozens for each of its orders.
 const PLACES_OF_A_TURN: u32 = 4000;
-/// Spread of a spring that a calibration has found, of it. *Guess*: the softness under light loads that play hides.
-const SPRING_OF_A_CALIBRATION: f64 = 0.2;
-/// Half a backlash that shows nowhere, arcsec. *Guess*: it stands for none where one may be.
-const LEAST_HALF_ARCSEC: f64 = 0.1;
+/// Half a backlash, or a wind-up, that shows nowhere, arcsec. *Guess*: it stands for none where one may be.
+const LEAST_ARCSEC: f64 = 0.1;
 /// Waves in a turn of the generator, or of its wave on the wheel that turns, that every strain wave gear has, and their
 /// first overtone.
 pub(crate) const OF_TWO_LOBES: [f64; 2] = [2.0, 4.0];
@@ -272,9 +270,13 @@ impl Nominal {
             phase_rad: line.phase_rad,
         });
         // A spring that is soft under light loads, and play, are much alike to a calibration, and both float.
-        let half_arcsec = (0.5 * nominal.backlash_arcsec).max(LEAST_HALF_ARCSEC);
+        let half_arcsec = (0.5 * nominal.backlash_arcsec).max(LEAST_ARCSEC);
         let backlash = HALF_A_LOST_MOTION_ARCSEC / half_arcsec;
-        let spread = Spread { stiffness: SPRING_OF_A_CALIBRATION, backlash, ..nominal.spread };
+        // Nor does a calibration know a spring, where loads go with the angle of the output or each log keeps to one.
+        let [low, high] = table.torque_range_n_m().map(f64::from);
+        let wind_up_arcsec = nominal.wind_up_arcsec(high.max(-low)).max(LEAST_ARCSEC);
+        let stiffness = FARTHEST_WIND_UP_RAD * ARCSEC_PER_RAD / wind_up_arcsec;
+        let spread = Spread { stiffness, backlash, ..nominal.spread };
         let (harmonics, backlash_arcsec) = (harmonics.collect(), 2.0 * half_arcsec);
         let friction_torque_n_m = dead_zone_n_m(table);
         Nominal { ratio, teeth: None, harmonics, backlash_arcsec, friction_torque_n_m, spread, ..nominal }

@@ -82,7 +82,7 @@ const CLEAR_OF_NOISE: f64 = 6.0;
 /// wrong flank.
 const OTHER_DEAD_ZONE: f64 = 0.8;
 /// Torques within this share of the largest are one.
-const SAME_TORQUE: f64 = 1e-3;
+pub(crate) const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
 const BOTH_WAYS: f64 = 0.1;
 /// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output, whose curve

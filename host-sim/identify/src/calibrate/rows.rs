@@ -8,11 +8,10 @@ use super::folds::{Folds, Row};
 use super::parts::{self, PartName, Scales, State, flank, width_of};
 use super::prior::Prior;
 use super::zero::OF_95_OF_BLOCKS;
-use crate::least_squares::Normal;
 use crate::measurement::{
     HELD, Recording, Session, TURNED_BACK_RAD, least_and_most, quantile_of, rates, sampled, turns, white_noise,
 };
-use crate::misfit::about_mean;
+use crate::misfit::{about_mean, correlation};
 use crate::residual::lasting_step;
 use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -351,15 +350,9 @@ impl Rows {
 
     /// Correlation of the load with what the first waves of the output make of it, 0 to 1.
     pub(crate) fn load_with_output_angle(&self) -> f64 {
-        let count = self.rows.len().max(1) as f64;
-        let fit = Normal::of(3, self.rows.len(), |k, row| {
-            (row[1], row[2]) = self.rows[k].at.output_rad.sin_cos();
-            (self.rows[k].at.torque_n_m, 1.0)
-        });
-        let Some(fit) = fit.and_then(|fit| fit.sound(self.rows.len())) else { return 0.0 };
-        let about = fit.square - fit.right[0] * fit.right[0] / count;
-        let explained = about - fit.misfit();
-        if about > 0.0 { (explained / about).clamp(0.0, 1.0).sqrt() } else { 0.0 }
+        let of = |value: fn(&State) -> f64| self.rows.iter().map(|row| value(&row.at)).collect::<Vec<f64>>();
+        let waves = [of(|_| 1.0), of(|at| at.output_rad.sin()), of(|at| at.output_rad.cos())];
+        correlation(&of(|at| at.torque_n_m), &waves)
     }
 
     /// Where an encoder lost its index, in what a model leaves, beside all `parts` that may be there: the log, the line

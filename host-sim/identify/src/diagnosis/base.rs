@@ -17,7 +17,9 @@ use super::candidate::geometry::Angle;
 use super::channels::waves;
 use super::flank_lag::{behind, flank_lag};
 use super::rows::Rows;
+use crate::calibrate::{SAME_TORQUE, TURNS_WITH_THE_OUTPUT};
 use crate::least_squares::FreeSpan;
+use crate::misfit::{about_mean, correlation};
 use crate::nominal::Nominal;
 use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -142,6 +144,8 @@ pub(crate) struct Base {
 
 /// The parameter that floats where angles are read at other instants than is known, s.
 pub const BETWEEN_READINGS: &str = "time between the readings";
+/// What floats as a load that goes with the angle of the output leaves open whose a wave of the output is.
+pub const WAVE_OF_LOAD: &str = "wave of the output under its load";
 /// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as
 /// this time says. Beside the lag that the rows tell best (`flank_lag`) it is that lag to first order.
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
@@ -150,6 +154,11 @@ pub(super) const FLANK_S: f64 = 5e-3;
 /// Spread of the drag of an output, of the load, where the nominal model states no friction. *Source*: what starts a
 /// drive of the catalogue (CSG-14 to 25, 100), through the ratio, is 7 to 21 % of its rated torque.
 const DRAG_OF_LOAD: f64 = 0.1;
+/// Spread of what a spring that a calibration has found hardens by, of it. *Guess*: the softness under light loads that
+/// play hides.
+const HARDENING: f64 = 0.2;
+/// Powers of the load that any spring may harden by. *Guess*: with that of itself those of a calibrated spring but one.
+const POWERS: i32 = 4;
 /// Prior standard deviation of what no drawing fixes, arcsec: the offset of the output encoder. *Guess*: 2.8°, so wide
 /// that the data alone decide.
 pub(super) const FREE: f64 = 1e4;
@@ -238,11 +247,23 @@ impl Base {
         let unknown_n_m = if stated { 0.0 } else { DRAG_OF_LOAD * rows.load_scale() };
         add("drag", (0..rows.len()).map(against).collect(), unknown_n_m);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
-        // Of a gear that is known by its ratio nothing says how its spring hardens.
+        // Of a gear that is known by its ratio nothing says how its spring hardens, nor, where a load goes with the angle
+        // of the output, what of the error is the spring's.
         if nominal.teeth.is_none() {
             let scale = rows.load_scale().max(f64::MIN_POSITIVE);
-            let harder = wind_up.iter().zip(&rows.torque).map(|(arcsec, torque)| arcsec * torque.abs() / scale);
-            add("stiffness under load", harder.collect(), nominal.spread.stiffness);
+            let under = |column: &[f64], power: i32| -> Vec<f64> {
+                let of = |(value, torque): (&f64, &f64)| value * (torque.abs() / scale).powi(power);
+                column.iter().zip(&rows.torque).map(of).collect()
+            };
+            let waves = waves_of_load(rows);
+            let (powers, spread) = if waves.is_some() { (POWERS, nominal.spread.stiffness) } else { (1, HARDENING) };
+            for power in 1..=powers {
+                add("stiffness under load", under(&wind_up, power), spread);
+            }
+            for wave in waves.iter().flatten() {
+                add(WAVE_OF_LOAD, wave.clone(), FREE);
+                add(WAVE_OF_LOAD, under(wave, 1), FREE);
+            }
         }
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
         for harmonic in &nominal.harmonics {
@@ -299,6 +320,16 @@ fn of_any_drive(rows: &Rows, used: &[usize]) -> FreeSpan {
     let of = |column: &[f64]| -> Vec<f64> { used.iter().map(|k| column[*k]).collect() };
     let any = [vec![1.0; used.len()], of(&rows.speed), of(&rows.output)].into_iter();
     FreeSpan::default().beyond(any.chain([1.0, 2.0].iter().flat_map(|k| waves(*k, &rows.output, used))))
+}
+
+/// First waves of the output, where the load is one of its angle, as the weight of an arm: then they and a spring are
+/// one.
+fn waves_of_load(rows: &Rows) -> Option<Vec<Vec<f64>>> {
+    let [sine, cosine] = waves(1.0, &rows.output, &(0..rows.len()).collect::<Vec<usize>>());
+    let by_angle = [vec![1.0; rows.len()], sine, cosine];
+    let varies = about_mean(&rows.torque) > SAME_TORQUE * rows.load_scale();
+    let goes = varies && correlation(&rows.torque, &by_angle) > TURNS_WITH_THE_OUTPUT;
+    goes.then(|| by_angle.into_iter().skip(1).collect())
 }
 
 /// Sum of squares that a law of the play leaves where the torque is around friction, freed of that.

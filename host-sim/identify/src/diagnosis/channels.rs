@@ -433,7 +433,7 @@ const FRICTION_OF_LOAD: f64 = 0.06;
 const TAKES_OF_LOAD: f64 = 0.5;
 
 /// Takes the friction of the play that the rows show in place of the one stated, which no catalogue prints, where it
-/// leaves less for certain, and of none; with a note. Else what changes its flank elsewhere would look like a zero of
+/// leaves less for certain, with a note, and of none. Else what changes its flank elsewhere would look like a zero of
 /// the torque, a step of an encoder, or a cause.
 pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, table: Option<&Table<'_>>) {
     let Some(rows) = followed(recording, nominal) else { return };
@@ -461,13 +461,12 @@ pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, ta
     let taken = |by: &Tried| sum(&as_stated, None) - sum(by, None);
     let certain = || left <= 1.0 - LEAST_GAIN && is_certain(&as_stated, best, GAIN_CERTAIN);
     if left < 1.0 && (stated == 0.0 || certain()) && taken(best) > share * taken(least(&rivals(), None)) {
-        let known =
-            if stated > 0.0 { format!("the model states a friction of {stated:.2}") } else { "none is known".into() };
-        recording.notes.push(format!(
-            "the output changes its flank at a load of about {n_m:.2} N·m, the friction of its play, where {known}: \
-             with that {:.0} % less is left, and it takes its place",
+        let instead = format!(
+            "the output changes its flank at a load of about {n_m:.2} N·m, the friction of its play, where the model \
+             states a friction of {stated:.2}: with that {:.0} % less is left, and it takes its place",
             100.0 * (1.0 - left)
-        ));
+        );
+        recording.notes.extend((stated > 0.0).then_some(instead));
         nominal.friction_torque_n_m = *n_m;
     }
 }

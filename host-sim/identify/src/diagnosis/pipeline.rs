@@ -16,6 +16,7 @@ use flexspline::{ImageError, Table};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::base::WAVE_OF_LOAD;
 use super::report::{Cause, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose};
 use super::{channels, zeros};
@@ -39,6 +40,10 @@ const CATALOGUE_DRIVE: &str = "catalogue drive";
 /// Rows that are diagnosed at most. *Chosen* for the memory that they take, 1.5 GB.
 const MOST_ROWS: usize = 1_000_000;
 
+/// Why first waves of the output are no cause's.
+const GOES_WITH_OUTPUT: &str = "the load goes with the angle of the output, as the weight of an arm does: wind-up and \
+                                one wave in a turn of the output are one here, and no cause of such a wave is named; \
+                                record other loads at the same angles, or give the stiffness (--model)";
 /// Advice where an error leaps so often that no row counts.
 const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of \
                                 this drive; record it under a load that keeps one flank";
@@ -329,6 +334,7 @@ pub fn diagnose_rows(
     let (mut diagnosis, extended) =
         diagnose(&recording.sessions, nominal, table, &settings, |done, of, what| progress(done, of + 1, what))?;
     zeros::tell(&mut recording, &diagnosis.zeros);
+    recording.notes.extend(diagnosis.recalibrated.contains_key(WAVE_OF_LOAD).then(|| GOES_WITH_OUTPUT.to_owned()));
     diagnosis.fitted_faults.iter().for_each(|fault| zeros::tell_fitted(&mut recording, fault));
     if recording.unusable.is_some() {
         // What makes them unusable is a channel that had to be left out.
@@ -634,6 +640,29 @@ mod tests {
         assert!(done.recording.notes.iter().any(|of| of.contains(note)), "{:?}", done.recording.notes);
         let other = Subject::of_ratio(1.0, (Drive::hhd_95(), GeneratorKind::Cam), ("g.csv", Vec::new(), &columns));
         assert!(other.err().unwrap().to_string().starts_with("--ratio: found 1, allowed: 2 to 10000"));
+    }
+
+    /// An arm: its weight goes with the angle of the output, and the noise of its torque is no word on whose a wave is.
+    #[test]
+    fn a_weight_leaves_open_whose_a_wave_of_the_output_is() {
+        let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
+        let (mut random, mut loads) = (fastrand::Rng::with_seed(3), Vec::new());
+        for k in 0..12_000 {
+            let psi = 300.0 * (1.0 - (f64::from(k) * std::f64::consts::PI / 3000.0).cos());
+            let output = psi / 95.0;
+            let load = 30.0 * (output - 0.4).sin();
+            loads.push(load);
+            let error = 8.0 * load + 30.0 * (output + 1.1).sin() + 20.0 * (2.0 * psi).sin() + 2.0 * random.f64();
+            text += &format!("{:.2},{psi:.6},{error:.4},{:.4}\n", 0.01 * f64::from(k), load + 0.2 * random.f64() - 0.1);
+        }
+        let (drive, columns) = ((Drive::hhd_95(), GeneratorKind::Cam), ColumnMap::default());
+        let mut subject = Subject::of_ratio(95.0, drive, ("arm.csv", text.clone().into_bytes(), &columns)).unwrap();
+        let rows = parse_rows("arm.csv", text.as_bytes(), &columns, &mut subject).unwrap();
+        let read = rows.sessions[0].torque_n_m.iter().flatten();
+        assert!(read.zip(loads).all(|(read, load)| (read - load).abs() < 0.01));
+        let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
+        assert_ne!(done.diagnosis.finding, Finding::FaultFound, "{}", done.diagnosis.text());
+        assert!(done.recording.notes.iter().any(|note| note == GOES_WITH_OUTPUT), "{:?}", done.recording.notes);
     }
 
     /// A model that holds a tilt of the output's encoder: a calibration has it neither in its rows nor in its table.

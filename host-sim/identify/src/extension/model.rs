@@ -111,6 +111,9 @@ impl Model {
         // A relative change of the wind-up is the inverse one of the stiffness.
         nominal.stiffness.iter_mut().for_each(|[_, k]| *k /= (1.0 + change("stiffness")).max(0.05));
         nominal.backlash_arcsec *= (1.0 + change("backlash")).max(0.0);
+        // What any drive may have is known of this one now, and a file holds no larger share.
+        nominal.spread.stiffness = nominal.spread.stiffness.min(1.0);
+        nominal.spread.backlash = nominal.spread.backlash.min(1.0);
         if nominal.spread.harmonic > 0.0 {
             // In phase and in quadrature, one pair for each harmonic that has an amplitude.
             let changes = numbered(&diagnosis.recalibrated, "harmonic");

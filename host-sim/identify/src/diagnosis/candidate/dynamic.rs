@@ -10,7 +10,7 @@ use crate::causes::spec::{
     Usual::{OfLoad, Value},
     number, phase, plain,
 };
-use crate::diagnosis::base::PlayLaw;
+use crate::diagnosis::base::{PlayLaw, WAVE_OF_LOAD};
 use crate::diagnosis::rows::quantile;
 use crate::diagnosis::thinned::Thinned;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -283,6 +283,10 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
 /// Models of an unbalanced load: the load that gravity adds moves the torque at which the play turns over, so that the
 /// law which the play follows there shows only now.
 fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
+    // It is one with a spring that nobody knows.
+    if on.base.floating.iter().any(|of| of.name == WAVE_OF_LOAD) {
+        return Vec::new();
+    }
     let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
     if !plays.contains(&on.base.law) {
         plays.push(on.base.law);
