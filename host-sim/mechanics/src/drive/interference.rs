@@ -20,6 +20,8 @@ use super::placement::{FlankDeviations, rotate};
 use super::ring::GeneratorKind;
 use super::spec::Drive;
 use super::tooth::{OutlinePiece, PieceKind, ToothFlank};
+use flexspline_base::robust::least_and_most;
+use flexspline_base::statistics::mean;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -276,20 +278,15 @@ impl RigidMesh {
     pub(super) fn room(&self) -> (f64, f64) {
         let pitch = TAU / self.flexspline_teeth;
         let within = (FRAC_PI_2 / pitch) as i32;
-        let room = |k: usize, side| {
+        // Forward; backward the same places are passed as in a mirror, the other way around.
+        let room = |k: usize| {
             let psi = pitch * k as f64 / PITCH_STEPS as f64;
-            let gaps = (-within..=within + 1).filter_map(|tooth| self.gap(f64::from(tooth) * pitch - psi, side));
+            let gaps = (-within..=within + 1).filter_map(|tooth| self.gap(f64::from(tooth) * pitch - psi, Side::Minus));
             gaps.map(|gap| gap.gap_rad).fold(f64::INFINITY, f64::min)
         };
-        let rooms: Vec<[f64; 2]> =
-            (0..PITCH_STEPS).into_par_iter().map(|k| Side::BOTH.map(|side| room(k, side))).collect();
-        let (mut total, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
-        for [backward, forward] in rooms {
-            total += backward + forward;
-            low = low.min(forward);
-            high = high.max(forward);
-        }
-        (total / PITCH_STEPS as f64, high - low)
+        let rooms: Vec<f64> = (0..PITCH_STEPS).into_par_iter().map(room).collect();
+        let (low, high) = least_and_most(rooms.iter().copied());
+        (2.0 * mean(&rooms), high - low)
     }
 
     /// Free rotation of the output at the tightest place of a whole turn, with the teeth as built and rigid.
