@@ -11,7 +11,7 @@ use super::info::MadeTable;
 use super::project::{TableError, empirical_percent, from_sweep};
 use super::sweep::{Sampler, SweepPlan, SweepProgress, TorqueSweepError, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
-use super::turns::{deviation_increments, sweep_turns};
+use super::turns::{DEVIATION_INCREMENTS, sweep_turns};
 use crate::cautions::{Caution, LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::{Stiffness, empirical_in_words};
 use crate::relief::tips_that_bear;
@@ -229,7 +229,7 @@ pub fn make(
 
 /// Increments that imperfections take.
 fn over_turns(drive: &Drive) -> usize {
-    if repeats(drive) { 0 } else { deviation_increments() }
+    if repeats(drive) { 0 } else { DEVIATION_INCREMENTS }
 }
 
 /// Whether one tooth pitch says all of a drive.

@@ -46,9 +46,7 @@ const SMOOTH_DRAG_N_M: f64 = 0.02;
 const PLASTIC: f64 = 1.324_717_957_244_746;
 
 /// Increments that the deviation takes, about.
-pub(crate) fn deviation_increments() -> usize {
-    2 * LEVELS * (PLACES + 4)
-}
+pub(crate) const DEVIATION_INCREMENTS: usize = 2 * LEVELS * (PLACES + 4);
 
 /// Runs the sweep of one generator at the torque and temperature nodes of the plan, for any drive: one that repeats
 /// from tooth to tooth is swept over one pitch ([`sweep`]), any other over whole turns of generator and output. Nodes
