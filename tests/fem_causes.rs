@@ -26,7 +26,7 @@ use flexspline_identify::nominal::Nominal;
 use flexspline_mechanics::drive::{AsBuilt, Drive, GeneratorKind, Harmonic};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::stepping::{Method, Problem, SolverSettings};
+use flexspline_mechanics::stepping::{Problem, SolverSettings};
 use flexspline_tests::command::Desk;
 use flexspline_tests::long;
 use rayon::prelude::*;
@@ -41,10 +41,6 @@ const LOADS: [f64; 3] = [4.0, 15.0, 50.0];
 /// are known by a straight line.
 const LINEAR: f64 = 0.05;
 const ECCENTRIC: f64 = 0.25;
-
-fn coarse() -> SolverSettings {
-    SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
-}
 
 /// Table and kernels of the ideal drive.
 pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
@@ -63,7 +59,8 @@ pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
             directions: if long() { 19 } else { 10 },
             ..KernelPlan::for_generator(GeneratorKind::Cam)
         };
-        let kernels = make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ());
+        let kernels =
+            make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, SolverSettings::fast(MeshLevel::Coarse), &|_| ());
         (std::fs::read(desk.path("made/cam.fxt")).unwrap(), Arc::new(kernels.unwrap()))
     })
 }
@@ -72,7 +69,13 @@ pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
 fn measured(change: impl Fn(&mut AsBuilt), seed: u64) -> Vec<Session> {
     let mut drive = Drive::hhd_95();
     change(&mut drive.as_built);
-    let problem = Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, coarse()).unwrap();
+    let problem = Problem::new(
+        &drive,
+        GeneratorKind::Cam,
+        drive.temperature.reference_c,
+        SolverSettings::fast(MeshLevel::Coarse),
+    )
+    .unwrap();
     // Places: 1.27 turns apart, at any phase of the teeth.
     let angles: Vec<f64> = (0..SESSIONS * PLACES).map(|k| 1.27 * TAU * k as f64).collect();
     let errors: Vec<Vec<f64>> = angles

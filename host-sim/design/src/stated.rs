@@ -563,11 +563,6 @@ mod tests {
     }
 
     use flexspline_mechanics::mesh::MeshLevel;
-    use flexspline_mechanics::stepping::Method;
-
-    fn coarse() -> SolverSettings {
-        SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
-    }
 
     fn shown(stated: Stated, beside: Vec<Beside>) -> SheetBeside {
         let (generator, loads, assumed) = (GeneratorKind::Cam, stated.loads(20.0), stated.assumed());
@@ -716,7 +711,9 @@ mod tests {
             unit_scatter_percent: Some(30.0),
             ..Stated::default()
         };
-        let of = |drive: &Drive| beside(drive, GeneratorKind::Cam, 20.0, &stated, coarse(), true);
+        let of = |drive: &Drive| {
+            beside(drive, GeneratorKind::Cam, 20.0, &stated, SolverSettings::fast(MeshLevel::Coarse), true)
+        };
         let get =
             |of: &SheetBeside, name: &str| of.beside.iter().find(|row| row.figure == name).unwrap().computed.unwrap();
         let smooth = of(&Drive::hhd_95());

@@ -293,12 +293,12 @@ mod tests {
     use super::*;
     use crate::drive::{Drive, FewNumbers, GeneratorKind};
     use crate::mesh::MeshLevel;
-    use crate::stepping::{Method, SolverSettings};
+    use crate::stepping::SolverSettings;
 
     fn problem(change: impl FnOnce(&mut Drive)) -> Problem {
         let mut drive = Drive::hhd_95();
         change(&mut drive);
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        let settings = SolverSettings::fast(MeshLevel::Coarse);
         Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, settings).unwrap()
     }
 
@@ -391,7 +391,7 @@ mod tests {
             "flexspline.rim_thickness_mm=1.05",
         ];
         let drive = few.drive("creeps").unwrap().drive.with_sets(sets).unwrap();
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        let settings = SolverSettings::fast(MeshLevel::Coarse);
         let problem = Problem::new(&drive, GeneratorKind::TwoRoller, drive.temperature.reference_c, settings).unwrap();
         let motion = Motion::deformed(&problem, 0.0).unwrap();
         println!("{} iterations", motion.last().iterations);
@@ -415,12 +415,7 @@ mod tests {
             "sleeve.hub_radius_mm=6.4902",
         ];
         let drive = few.drive("binds").unwrap().drive.with_sets(sets).unwrap();
-        let settings = SolverSettings {
-            method: Method::Fast,
-            mesh: MeshLevel::Coarse,
-            max_halvings: 0,
-            ..SolverSettings::default()
-        };
+        let settings = SolverSettings { max_halvings: 0, ..SolverSettings::fast(MeshLevel::Coarse) };
         let problem = Problem::new(&drive, kind, drive.temperature.reference_c, settings).unwrap();
         let mut motion = Motion::deformed(&problem, 0.0).unwrap();
         assert_eq!(motion.last().flank_contacts, 4);

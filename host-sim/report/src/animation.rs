@@ -412,11 +412,6 @@ impl Animation {
 mod tests {
     use super::*;
     use flexspline_mechanics::mesh::MeshLevel;
-    use flexspline_mechanics::stepping::Method;
-
-    fn coarse() -> SolverSettings {
-        SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
-    }
 
     /// Eight frames of one pitch must give back every node of every sector in a drive that has gone on for another
     /// pitch.
@@ -424,7 +419,7 @@ mod tests {
     fn eight_frames_describe_every_tooth_at_any_time() {
         let drive = Drive::hhd_95();
         let torque = 10.0;
-        let animation = animate(&drive, GeneratorKind::Cam, torque, coarse()).unwrap();
+        let animation = animate(&drive, GeneratorKind::Cam, torque, SolverSettings::fast(MeshLevel::Coarse)).unwrap();
         let pitch = std::f64::consts::TAU / 188.0;
         let far: Vec<_> = (0..=24)
             .map(|k| flexspline_design::simulate::PathPoint {
@@ -434,7 +429,7 @@ mod tests {
             .collect();
         let settings = SimulationSettings {
             torque_n_m: torque,
-            solver: coarse(),
+            solver: SolverSettings::fast(MeshLevel::Coarse),
             ..SimulationSettings::new(GeneratorKind::Cam, Path::Points(far))
         };
         let mut checked = 0;
@@ -480,7 +475,7 @@ mod tests {
     fn the_forces_that_are_shown_hold_the_load() {
         let drive = Drive::hhd_95();
         let torque = 50.0;
-        let a = animate(&drive, GeneratorKind::Cam, torque, coarse()).unwrap();
+        let a = animate(&drive, GeneratorKind::Cam, torque, SolverSettings::fast(MeshLevel::Coarse)).unwrap();
         let samples = a.flexspline.samples;
         let at = |row: usize, s: usize| a.forces[row * samples + s];
         for frame in 0..FRAMES {
@@ -512,7 +507,10 @@ mod tests {
                 temperature_c: None,
             });
             let path = Path::Points(points.collect());
-            let settings = SimulationSettings { solver: coarse(), ..SimulationSettings::new(GeneratorKind::Cam, path) };
+            let settings = SimulationSettings {
+                solver: SolverSettings::fast(MeshLevel::Coarse),
+                ..SimulationSettings::new(GeneratorKind::Cam, path)
+            };
             let mut passing = Passing::new(&drive);
             let mut settled = 0;
             simulate(&drive, &settings, &mut |now| {
@@ -529,14 +527,15 @@ mod tests {
     #[test]
     fn what_does_not_repeat_is_refused() {
         let drive = Drive::hhd_95().with_set("as_built.circular_spline_eccentricity_um=10").unwrap();
-        let error = animate(&drive, GeneratorKind::Cam, 0.0, coarse()).unwrap_err();
+        let error = animate(&drive, GeneratorKind::Cam, 0.0, SolverSettings::fast(MeshLevel::Coarse)).unwrap_err();
         assert!(error.to_string().contains("as_built.circular_spline_eccentricity_um"), "{error}");
     }
 
     /// Four generators on the standard mesh have to fit a page of 1.5 MB; the coarse mesh has half its nodes.
     #[test]
     fn a_drive_in_motion_is_small() {
-        let a = animate(&Drive::hhd_95(), GeneratorKind::TwoRoller, 10.0, coarse()).unwrap();
+        let a =
+            animate(&Drive::hhd_95(), GeneratorKind::TwoRoller, 10.0, SolverSettings::fast(MeshLevel::Coarse)).unwrap();
         let packed = a.pack();
         let characters: usize = packed.iter().map(|p| p.text.len()).sum();
         let numbers = a.flexspline.displacement_mm.len() + a.circular_spline.displacement_mm.len();

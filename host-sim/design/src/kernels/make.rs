@@ -479,12 +479,7 @@ mod tests {
     use super::*;
     use flexspline_mechanics::drive::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
     use flexspline_mechanics::mesh::MeshLevel;
-    use flexspline_mechanics::stepping::Method;
     use std::sync::{LazyLock, OnceLock};
-
-    fn coarse() -> SolverSettings {
-        SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
-    }
 
     /// Kernels of the cam under a few loads.
     fn cam() -> &'static Kernels {
@@ -496,7 +491,7 @@ mod tests {
                 directions: 19,
                 ..KernelPlan::for_generator(GeneratorKind::Cam)
             };
-            make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ()).unwrap()
+            make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, SolverSettings::fast(MeshLevel::Coarse), &|_| ()).unwrap()
         })
     }
 
@@ -504,7 +499,8 @@ mod tests {
         let mut drive = Drive::hhd_95();
         change(&mut drive.as_built);
         drive.output.drag_torque_n_m = DRAG_N_M;
-        Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, coarse()).unwrap()
+        Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, SolverSettings::fast(MeshLevel::Coarse))
+            .unwrap()
     }
 
     /// FEM result of a drive with a deviation, less the ideal one, at whole pitches under a load.
@@ -662,7 +658,12 @@ mod tests {
         let at = |size_um: f64| {
             let mut drive = Drive::hhd_95();
             drive.as_built.circular_spline_eccentricity_um = size_um;
-            Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, coarse())
+            Problem::new(
+                &drive,
+                GeneratorKind::Cam,
+                drive.temperature.reference_c,
+                SolverSettings::fast(MeshLevel::Coarse),
+            )
         };
         let [small, large] = [5.0, 8.0].map(|size| at(size).unwrap());
         let of = |motion: Motion<'_>| loaded(motion, &[5.0]).unwrap()[0];
@@ -689,7 +690,8 @@ mod tests {
         let mut drive = Drive::hhd_95();
         drive.circular_spline.root_radius_mm = 49.38;
         let of = |plan: &KernelPlan| {
-            eccentric(&drive, GeneratorKind::Cam, plan, 2, coarse(), &|| ()).map(|found| found.sizes_um)
+            eccentric(&drive, GeneratorKind::Cam, plan, 2, SolverSettings::fast(MeshLevel::Coarse), &|| ())
+                .map(|found| found.sizes_um)
         };
         assert_eq!(of(&plan(Some(4.0))).unwrap(), [5.0]);
         let refused = of(&plan(None)).unwrap_err();
@@ -706,7 +708,7 @@ mod tests {
         let mut drive = Drive::hhd_95();
         drive.as_built.circular_spline_offset_um = 1.0;
         let plan = KernelPlan::for_generator(GeneratorKind::Cam);
-        let refused = make(&drive, GeneratorKind::Cam, &plan, coarse(), &|_| ());
+        let refused = make(&drive, GeneratorKind::Cam, &plan, SolverSettings::fast(MeshLevel::Coarse), &|_| ());
         assert!(matches!(refused, Err(KernelError::NotIdeal { field: "as_built.circular_spline_offset_um" })));
     }
 }

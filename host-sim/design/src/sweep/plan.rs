@@ -17,7 +17,7 @@ use crate::stated::Stated;
 use flexspline_base::output::{OutputError, Outputs};
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_mechanics::stepping::{Method, SolverSettings};
+use flexspline_mechanics::stepping::SolverSettings;
 
 /// Version of `plan.json`.
 const SCHEMA: u32 = 1;
@@ -69,7 +69,7 @@ pub struct VariantPlan {
     stated: Option<Stated>,
     /// The generators.
     pub generators: Vec<GeneratorKind>,
-    mesh: MeshLevel,
+    pub(super) mesh: MeshLevel,
     pub(super) by: HowComputed,
     /// Fields that each variant sets.
     pub columns: Vec<String>,
@@ -189,7 +189,7 @@ impl VariantPlan {
         let lines = drawn.iter().map(|one| sets(&of.list, one).into_iter().filter_map(split).unzip());
         let (columns, variants): (Vec<Vec<String>>, Vec<Vec<String>>) = lines.unzip();
         let columns = columns.into_iter().next().unwrap_or_default();
-        let by = respond(of, solver(settings.mesh), progress)?;
+        let by = respond(of, SolverSettings::fast(settings.mesh), progress)?;
         Ok(VariantPlan::new((&of.drive, None), &[of.generator], (columns, variants), by, settings.mesh))
     }
 
@@ -256,11 +256,6 @@ impl VariantPlan {
             Some(stated) if torque_n_m.is_none() => stated.loads(of_size_n_m),
             _ => Loads::up_to(torque_n_m.unwrap_or(of_size_n_m)),
         }
-    }
-
-    /// Settings of all FEM.
-    pub(super) fn solver(&self) -> SolverSettings {
-        solver(self.mesh)
     }
 
     /// The contents of both files.
@@ -341,10 +336,6 @@ impl VariantPlan {
         let plan = VariantPlan { drive, stated, generators, mesh, by, columns, variants, hash };
         plan.makes_drives(&csv.display().to_string())
     }
-}
-
-fn solver(mesh: MeshLevel) -> SolverSettings {
-    SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() }
 }
 
 /// Records as lines of CSV.

@@ -19,6 +19,7 @@ use super::plan::{HowComputed, PlanError, VariantPlan, csv_of};
 use crate::data_sheet::{FIGURES, data_sheet};
 use flexspline_base::output::{OutputError, note_appended};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::stepping::SolverSettings;
 
 /// First columns of results.
 const BEFORE: [&str; 4] = ["plan", "variant", "generator", "status"];
@@ -218,8 +219,8 @@ fn computed(plan: &VariantPlan, variant: usize, generator: GeneratorKind, model:
 fn by_sheet(plan: &VariantPlan, drive: &Drive, row: &mut VariantRow) {
     let HowComputed::Sheet { torque_n_m, positions } = plan.by else { return };
     let loads = plan.loads(drive, row.generator, torque_n_m);
-    let temperature_c = drive.temperature.reference_c;
-    let (mut sheet, done) = data_sheet(drive, row.generator, temperature_c, loads, positions, plan.solver());
+    let (at_c, settings) = (drive.temperature.reference_c, SolverSettings::fast(plan.mesh));
+    let (mut sheet, done) = data_sheet(drive, row.generator, at_c, loads, positions, settings);
     match done {
         Ok(()) => {
             row.status = RunStatus::Converged;

@@ -12,7 +12,7 @@ use flexspline_base::statistics::{mean, std_dev};
 use flexspline_mechanics::drive::{AsBuilt, Drive, GeneratorKind, Wheel};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::stepping::Problem;
+use flexspline_mechanics::stepping::{Problem, SolverSettings};
 
 /// arcsec for a micrometre of displaced axis, in the test kernels.
 const PER_UM: f64 = 2.0;
@@ -285,7 +285,8 @@ fn kernels_agree_with_fem() {
     let model = plan.model().unwrap();
     let places: Vec<f64> = (0..5).map(|j| 95.0 * f64::from(j) / 5.0).collect();
     let by_fem = |drive: &Drive| -> Vec<f64> {
-        let problem = Problem::new(drive, GeneratorKind::Cam, of.temperature_c, plan.solver()).unwrap();
+        let problem =
+            Problem::new(drive, GeneratorKind::Cam, of.temperature_c, SolverSettings::fast(plan.mesh)).unwrap();
         let error = |turns: &f64| {
             let mut motion = Motion::deformed_or_turned_in(&problem, TAU * turns).unwrap();
             motion.load(of.torque_n_m).unwrap();

@@ -418,10 +418,9 @@ pub(crate) fn mirror(sample: &Sample) -> Sample {
 mod tests {
     use super::*;
     use flexspline_mechanics::mesh::MeshLevel;
-    use flexspline_mechanics::stepping::Method;
 
     fn coarse(drive: &Drive, kind: GeneratorKind, positions: usize) -> Sampler<'static> {
-        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        let settings = SolverSettings::fast(MeshLevel::Coarse);
         Sampler::new(drive, kind, positions, 20.0, settings, &|_| ControlFlow::Continue(())).unwrap()
     }
 

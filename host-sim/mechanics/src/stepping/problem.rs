@@ -96,6 +96,11 @@ pub struct SolverSettings {
 }
 
 impl SolverSettings {
+    /// The solver `fast` on a mesh.
+    pub fn fast(mesh: MeshLevel) -> SolverSettings {
+        SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() }
+    }
+
     /// Penalty on the bore for a generator, N/mm³.
     pub fn bore_penalty(&self, kind: GeneratorKind) -> f64 {
         self.bore_penalty.unwrap_or(if kind.has_rollers() { 1e7 } else { 1e6 })
@@ -525,8 +530,7 @@ mod tests {
         let drive = Drive::hhd_95();
         let shape = drive.generator.shape(GeneratorKind::Cam);
         for (holding, sense) in [(Holding::WholeBore, 0.0), (Holding::OnePoint, -1.0)] {
-            let settings =
-                SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, holding, ..SolverSettings::default() };
+            let settings = SolverSettings { holding, ..SolverSettings::fast(MeshLevel::Coarse) };
             let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
             let (mesh, _) = problem.wheels();
             let rotation = |of: &dyn Fn([f64; 2]) -> [f64; 2]| -> f64 {

@@ -151,13 +151,9 @@ mod tests {
     use crate::motion::Motion;
     use crate::stepping::{Method, Problem, SolverSettings};
 
-    fn coarse() -> SolverSettings {
-        SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
-    }
-
     /// A drive with a generator at its reference temperature, on the coarse mesh.
     fn problem(drive: &Drive, kind: GeneratorKind) -> Problem {
-        Problem::new(drive, kind, 20.0, coarse()).unwrap()
+        Problem::new(drive, kind, 20.0, SolverSettings::fast(MeshLevel::Coarse)).unwrap()
     }
 
     /// Error of both solvers where the drive ends that moves under 50 N·m, arcsec; they agree to 0.1″.
@@ -377,7 +373,7 @@ mod tests {
     /// closes. Without that in the step iterations run out.
     #[test]
     fn rough_leaning_teeth_are_loaded_and_unloaded() {
-        let settings = SolverSettings { max_halvings: 0, ..coarse() };
+        let settings = SolverSettings { max_halvings: 0, ..SolverSettings::fast(MeshLevel::Coarse) };
         let sets = ["flanks.friction_coefficient=0.08", "flexspline.crowning_um=20", "flanks.preload_um=-20"];
         let drive = sliced(Drive::s_95(), 0.0).with_sets(sets).unwrap();
         let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
