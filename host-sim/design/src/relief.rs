@@ -10,7 +10,7 @@
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings};
+use flexspline_mechanics::stepping::{Increment, Problem, SolveError, SolverSettings, State};
 
 use crate::simulate::TipContact;
 use crate::simulate::zones::MOST_MODULES;
@@ -60,13 +60,13 @@ pub fn relieve_tips(
     let module_mm = drive.flexspline.module_mm;
     let mut drive = drive.clone();
     let drawn_mm = drive.flexspline.tip_radius_mm;
-    let (mut drawn, mut left) = (None, None);
+    let (mut drawn, mut left, mut loaded) = (None, None, None);
     // Tips and the share of the load on them, one run ago.
     let mut before: Option<(f64, f64)> = None;
     for step in 0..=MOST_STEPS {
         let tip_radius_mm = drive.flexspline.tip_radius_mm;
         report(&format!("{torque_n_m} N·m, tips at {tip_radius_mm} mm"));
-        left = tips_that_bear(&drive, kind, torque_n_m)?;
+        left = tips_that_bear(&drive, kind, torque_n_m, &mut loaded)?;
         drawn = drawn.or(left);
         let Some(tips) = left.filter(|tips| may_lower && tips.relief_step_mm > 0.0 && step < MOST_STEPS) else { break };
         // The share falls in proportion to what is taken off: two runs say where it ends.
@@ -87,7 +87,8 @@ pub fn relieve_tips(
 }
 
 /// Contact of tips outside the teeth in mesh over a tooth pitch under a load, on a coarse mesh; the first place that
-/// has it.
+/// has it. `loaded` is where the drive stands under its load at first; of one that was looked at before, with other
+/// tips, that shows the way to it.
 ///
 /// # Errors
 /// No equilibrium.
@@ -95,16 +96,20 @@ pub(crate) fn tips_that_bear(
     drive: &Drive,
     kind: GeneratorKind,
     torque_n_m: f64,
+    loaded: &mut Option<(State, Increment)>,
 ) -> Result<Option<TipContact>, SolveError> {
-    let mesh = MeshLevel::Coarse;
-    let settings = SolverSettings { method: Method::Fast, mesh, max_work: MOST_WORK, ..SolverSettings::default() };
+    let fast = SolverSettings::fast(MeshLevel::Coarse);
+    let settings = SolverSettings { load_step_n_m: f64::INFINITY, max_work: MOST_WORK, ..fast };
     let problem = Problem::new(drive, kind, drive.temperature.reference_c, settings)?;
-    let mut motion = Motion::deformed_or_turned_in(&problem, 0.0)?;
+    let before = loaded.take().and_then(|(state, last)| {
+        let mut motion = Motion::taken_over(&problem, state, last);
+        motion.load(torque_n_m).ok().map(|()| motion)
+    });
+    let mut motion = before.map_or_else(|| Motion::deformed_or_turned_in(&problem, 0.0), Ok)?;
     motion.load(torque_n_m)?;
+    *loaded = Some((motion.state().clone(), motion.last().clone()));
     for place in 0..PLACES {
-        if place > 0 {
-            motion.turn(motion.pitch() / PLACES as f64)?;
-        }
+        motion.turn_to(motion.pitch() * place as f64 / PLACES as f64)?;
         let found = TipContact::at(&problem, motion.state()).filter(TipContact::counts);
         if found.is_some() {
             return Ok(found);

@@ -192,7 +192,7 @@ pub fn make(
     let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
     // Tips are looked at on a core that the sweep leaves idle.
     let sweep = || sweep_turns(drive, kind, &plan, &chosen.known, &sampler, settings.solver, &report);
-    let (swept, tips) = rayon::join(sweep, || tips_that_bear(drive, kind, largest_n_m));
+    let (swept, tips) = rayon::join(sweep, || tips_that_bear(drive, kind, largest_n_m, &mut None));
     let mut swept = swept?;
     swept.work.add(chosen.work);
     let peak_flank_pressure_mpa = swept.work.peak_flank_pressure_mpa;

@@ -5,8 +5,6 @@ use crate::contact::{BoreLaw, FlankLaw};
 use super::problem::{Problem, SolverSettings};
 use super::state::State;
 
-/// Largest first step of a changing load, N m.
-const LARGEST_LOAD_STEP: f64 = 100.0;
 /// Factors on the penalties while the way to a new load is found.
 pub(super) const LOADING_SOFTNESS: [f64; 2] = [1e-3, 3e-2];
 /// Factors on the penalties on the way to a far place: of 0.1, 0.03, 0.01, (0.001, 0.03) and none this takes the fewest
@@ -135,15 +133,14 @@ pub(super) struct Continuation {
 }
 
 impl Continuation {
-    pub fn new(from: &State, generator_rad: f64, torque_n_m: f64) -> Continuation {
+    /// A load is at first brought on in parts of `largest_n_m` at most.
+    pub fn new(from: &State, generator_rad: f64, torque_n_m: f64, largest_n_m: f64) -> Continuation {
         let load = torque_n_m - from.torque_n_m;
-        // A load that comes on from nothing is best brought on in a few steps.
-        let part = if load.abs() > LARGEST_LOAD_STEP { LARGEST_LOAD_STEP / load.abs() } else { 1.0 };
         Continuation {
             from: [from.generator_rad, from.torque_n_m],
             change: [generator_rad - from.generator_rad, load],
             done: 0.0,
-            part,
+            part: (largest_n_m / load.abs()).min(1.0),
             halvings: 0,
             patient: false,
             iterations: 0,

@@ -192,7 +192,7 @@ impl<'p> Solver<'p> {
     /// needs it, in several.
     pub fn increment(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Solved {
         let mut work = WorkLimit::new(&self.problem.settings);
-        let mut way = Continuation::new(from, generator_rad, torque_n_m);
+        let mut way = Continuation::new(from, generator_rad, torque_n_m, self.problem.settings.load_step_n_m);
         let mut state = from.clone();
         let mut compliance = None;
         for _ in 0..MOST_PARTS {

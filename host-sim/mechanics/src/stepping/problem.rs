@@ -86,6 +86,9 @@ pub struct SolverSettings {
     pub holding: Holding,
     /// Residual force, relative to the largest contact force, at which an increment is done.
     pub tolerance: f64,
+    /// Largest first step of a load that comes on, N m: by default one of a table comes on in few. What only has to be
+    /// found may come on at once, as Newton's method halves what is too far.
+    pub load_step_n_m: f64,
     /// Newton iterations before an increment is halved.
     pub max_iterations: usize,
     /// Halvings of an increment before giving up.
@@ -123,6 +126,7 @@ impl Default for SolverSettings {
             bore_points: None,
             holding: Holding::default(),
             tolerance: 1e-6,
+            load_step_n_m: 100.0,
             max_iterations: 60,
             max_halvings: 8,
             max_work: 6000,
