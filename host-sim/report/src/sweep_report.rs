@@ -144,7 +144,7 @@ fn best(of: &SweepSources<'_>) -> Headline {
     let front = judge.front(plan, &sweep.rows);
     let mut best = judge.targets.iter().take(2).filter_map(|(name, sense)| {
         let figure = plan.figure(name)?;
-        let cost = |row: &VariantRow| sense.cost(name, row.figures[figure]);
+        let cost = |row: &VariantRow| sense.cost(name, row.figures[figure], row.generator);
         let row = *front.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
         Some((name, *sense, row, row.figures[figure]))
     });
