@@ -191,10 +191,10 @@ pub struct DataSheet {
     /// Largest von Mises stress under the largest load, MPa: a nodal value, which grows with the mesh at roots and
     /// contacts.
     pub max_von_mises_mpa: Option<f64>,
-    /// Largest von Mises stress in the root fillets of the flexspline, MPa, by the strain of their surface:
-    /// `simulate --stress` says what it tends to with the mesh.
+    /// Largest von Mises stress in the root fillets of the flexspline, MPa, by the strain of their surface, as cautions
+    /// judge it: `simulate --stress` says what it tends to with the mesh.
     pub root_fillet_mpa: Option<f64>,
-    /// The same as cautions judge it, in the second place.
+    /// The same on the mesh of the run, and as cautions judge it.
     #[serde(skip)]
     pub judged_fillet_mpa: Option<[f64; 2]>,
     /// The largest on the bore, MPa, nodal.
@@ -288,6 +288,7 @@ pub fn data_sheet(
     let at = (0.0, loads.largest_n_m);
     sheet.judged_fillet_mpa =
         sheet.root_fillet_mpa.map(|by_run| judged_fillet_mpa(drive, kind, temperature_c, at, settings, by_run));
+    sheet.root_fillet_mpa = sheet.judged_fillet_mpa.map(|[_, judged]| judged);
     (sheet, done)
 }
 
