@@ -22,9 +22,11 @@ use crate::Claims;
 use crate::dat::{Table, at_step};
 use crate::program::{Limits, calculix};
 
-/// Largest relative difference of the stress. Found: 3.0 and 2.5 %, which are those of the mesh: with our elements in
-/// place of half as long ones CalculiX has 345.9 and 424.0 MPa, we 346.2 and 424.1.
+/// Largest relative difference of the stress. Found: 3.0 and 2.5 %.
 const STRESS: f64 = 0.03;
+/// What it is of: elements of half the length take 2.9 and 2.5 % (a quarter 1.7 and 0.1 % more), an edge displaced as
+/// by a mesh half as fine 0.2 %; on the same elements CalculiX and we differ by this at most (found: 0.1 and 0.0 %).
+const SAME_ELEMENTS: f64 = 0.002;
 /// Where a run stops being worth waiting for; it takes two seconds.
 const LIMITS: Limits = Limits { cpu_s: 120.0, memory_mb: 2000.0 };
 /// Generators and loads, N m: half of what a table of each spans, where the cam winds the drive up most and two rollers
@@ -48,17 +50,23 @@ pub fn fillets(ccx: &Path, out: &Path, claims: &mut Claims) -> Result<String, St
         let ours =
             stress.iter().find(|stress| stress.place == Place::RootFillet).ok_or("no stress of the root fillet")?;
         let finest = MESHES[MESHES.len() - 1];
-        let fine = WheelMesh::flexspline_as_fine_as(&drive, &MeshLevel::Coarse.flexspline().times(2 * finest))
+        // Meshes of edge and elements: as compared; on our elements; with the edge of a mesh half as fine.
+        let mut theirs = [0.0; 3];
+        for (theirs, [of_edge, elements]) in
+            theirs.iter_mut().zip([[finest, 2 * finest], [finest; 2], [finest / 2, 2 * finest]])
+        {
+            let fine = WheelMesh::flexspline_as_fine_as(&drive, &MeshLevel::Coarse.flexspline().times(elements))
+                .map_err(|error| error.to_string())?;
+            let (edge, material) = on_mesh(&drive, kind, reference_c, at, of_edge, settings, |problem, state| {
+                (edge_of_cell(problem, state, &fine, ours.tooth), problem.material)
+            })
             .map_err(|error| error.to_string())?;
-        let (edge, material) = on_mesh(&drive, kind, reference_c, at, finest, settings, |problem, state| {
-            (edge_of_cell(problem, state, &fine, ours.tooth), problem.material)
-        })
-        .map_err(|error| error.to_string())?;
-        let (deck, numbers) = deck(&drive, &fine, ours.tooth, &edge);
-        std::fs::write(folder.join("root.inp"), deck).map_err(|error| error.to_string())?;
-        let (used, tables) = calculix(ccx, &folder, "root", LIMITS)?;
-        let theirs = largest_in_fillet(&tables, &fine, ours.tooth, &numbers, &material)?;
-        lines.push(summary(kind, torque_n_m, ours, theirs, used.cpu_s, claims));
+            let (deck, numbers) = deck(&drive, &fine, ours.tooth, &edge);
+            std::fs::write(folder.join("root.inp"), deck).map_err(|error| error.to_string())?;
+            let (_, tables) = calculix(ccx, &folder, "root", LIMITS)?;
+            *theirs = largest_in_fillet(&tables, &fine, ours.tooth, &numbers, &material)?;
+        }
+        lines.push(summary(kind, torque_n_m, ours, theirs, claims));
     }
     Ok(lines.join(", "))
 }
@@ -67,24 +75,25 @@ fn summary(
     kind: GeneratorKind,
     torque_n_m: f64,
     ours: &PlaceStress,
-    theirs: f64,
-    cpu_s: f64,
+    [theirs, on_ours, by_coarser]: [f64; 3],
     claims: &mut Claims,
 ) -> String {
     let [low, high] = ours.interval_mpa;
-    println!("== root fillet, {kind} at {torque_n_m} N·m; CalculiX {cpu_s:.1} s");
+    println!("== root fillet, {kind} at {torque_n_m} N·m");
     println!(
-        "  ours {:.1} MPa ({low:.1} to {high:.1}), by mesh {:.1?}; CalculiX {theirs:.1} MPa",
+        "  ours {:.1} MPa ({low:.1} to {high:.1}), by mesh {:.1?}; CalculiX {theirs:.1} MPa, on our elements \
+         {on_ours:.1}, edge of a mesh half as fine {by_coarser:.1}",
         ours.von_mises_mpa, ours.by_mesh_mpa
     );
     let apart = ours.von_mises_mpa / theirs - 1.0;
     claims.check(&format!("stress within {:.0} %", 100.0 * STRESS), apart.abs() <= STRESS);
+    let same = (ours.von_mises_mpa / on_ours - 1.0).abs();
+    claims.check(&format!("on the same elements within {:.1} %", 100.0 * SAME_ELEMENTS), same <= SAME_ELEMENTS);
     claims.check("the interval covers it", (low..=high).contains(&theirs));
     format!("root fillet of {kind} {:+.1} %", 100.0 * apart)
 }
 
-/// Displacements of the nodes of `fine` on bore, flanks and faces of a cell, as the drive has them on a mesh half as
-/// fine.
+/// Displacements of the nodes of `fine` on bore, flanks and faces of a cell, as the drive has them on a coarser mesh.
 fn edge_of_cell(problem: &Problem, state: &State, fine: &WheelMesh, tooth: usize) -> Edge {
     let mesh = &problem.flexspline;
     let moved = |(local, further): (u32, usize)| {
@@ -94,10 +103,11 @@ fn edge_of_cell(problem: &Problem, state: &State, fine: &WheelMesh, tooth: usize
     let mut edge = Edge::new();
     for (coarse, fine) in chains(mesh).into_iter().zip(chains(fine)) {
         let edges = (coarse.len() - 1) / 2;
-        assert_eq!(fine.len(), 4 * edges + 1, "the fine mesh has two edges for one");
+        // Nodes of the fine mesh along an edge of the coarser one.
+        let each = (fine.len() - 1) / edges;
         for (k, node) in fine.into_iter().enumerate() {
-            let e = (k / 4).min(edges - 1);
-            let x = 0.5 * (k - 4 * e) as f64 - 1.0;
+            let e = (k / each).min(edges - 1);
+            let x = 2.0 * (k - each * e) as f64 / each as f64 - 1.0;
             let weights = [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)];
             let ends = [0, 1, 2].map(|i| moved(coarse[2 * e + i]));
             let at = [0, 1].map(|axis| (0..3).map(|i| weights[i] * ends[i][axis]).sum());
