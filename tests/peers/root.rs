@@ -52,9 +52,8 @@ pub fn fillets(ccx: &Path, out: &Path, claims: &mut Claims) -> Result<String, St
         let finest = MESHES[MESHES.len() - 1];
         // Meshes of edge and elements: as compared; on our elements; with the edge of a mesh half as fine.
         let mut theirs = [0.0; 3];
-        for (theirs, [of_edge, elements]) in
-            theirs.iter_mut().zip([[finest, 2 * finest], [finest; 2], [finest / 2, 2 * finest]])
-        {
+        let meshes = [[finest, 2 * finest], [finest; 2], [finest / 2, 2 * finest]];
+        for (theirs, [of_edge, elements]) in theirs.iter_mut().zip(meshes) {
             let fine = WheelMesh::flexspline_as_fine_as(&drive, &MeshLevel::Coarse.flexspline().times(elements))
                 .map_err(|error| error.to_string())?;
             let (edge, material) = on_mesh(&drive, kind, reference_c, at, of_edge, settings, |problem, state| {
@@ -103,11 +102,10 @@ fn edge_of_cell(problem: &Problem, state: &State, fine: &WheelMesh, tooth: usize
     let mut edge = Edge::new();
     for (coarse, fine) in chains(mesh).into_iter().zip(chains(fine)) {
         let edges = (coarse.len() - 1) / 2;
-        // Nodes of the fine mesh along an edge of the coarser one.
-        let each = (fine.len() - 1) / edges;
+        let per_edge = (fine.len() - 1) / edges;
         for (k, node) in fine.into_iter().enumerate() {
-            let e = (k / each).min(edges - 1);
-            let x = 2.0 * (k - each * e) as f64 / each as f64 - 1.0;
+            let e = (k / per_edge).min(edges - 1);
+            let x = 2.0 * (k - per_edge * e) as f64 / per_edge as f64 - 1.0;
             let weights = [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)];
             let ends = [0, 1, 2].map(|i| moved(coarse[2 * e + i]));
             let at = [0, 1].map(|axis| (0..3).map(|i| weights[i] * ends[i][axis]).sum());
