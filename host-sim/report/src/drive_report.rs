@@ -220,7 +220,9 @@ impl<'a> DriveKnown<'a> {
             ChartSeries::new(name, mark, colour, self.torques().into_iter().map(mean).collect())
         };
         let mut series: Vec<ChartSeries> = WAYS.into_iter().enumerate().map(of).collect();
-        if let Ok(a) = &self.subject.animation {
+        // The FEM lacks what a data sheet adds.
+        let is_bare = self.subject.info.is_none_or(|info| info.completed.is_none());
+        if let Some(a) = self.subject.animation.as_ref().ok().filter(|_| is_bare) {
             let point = vec![[a.torque_n_m, mean_arcsec(a)]];
             series.push(ChartSeries::new("forward, fresh FEM", Mark::Points, 2, point));
         }
