@@ -235,7 +235,7 @@ impl Model {
         Err(CalibrationError::Known(format!(
             "torque: found {by:.1} arcsec of the output from {low:.2} to {high:.2} N·m; allowed: a torque that is \
              positive where it turns the output forward, so that the error grows with it. --columns torque=NAME:-N.m \
-             turns its sign"
+             turns its sign; an error that counts the other way does the same"
         )))
     }
 

@@ -122,9 +122,11 @@ fn first_torque_nodes(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> 
         None => recorded.scales.torque_n_m,
     };
     let friction = recorded.scales.friction_n_m;
+    // Of a load that is as good as a zero nobody knows the wind-up.
+    let unknown = recorded.each_keeps_to_one_load && prior.nominal.wind_up_arcsec(1.0) == 0.0;
     let mut nodes: Vec<f64> = match prior.table {
         Some(table) => table.torque_nodes_n_m().map(f64::from).collect(),
-        None if !recorded.has_torque || high - low <= super::SAME_TORQUE * low.abs().max(high.abs()) => {
+        None if unknown || !recorded.has_torque || high - low <= super::SAME_TORQUE * low.abs().max(high.abs()) => {
             return vec![f64::midpoint(low, high) as f32];
         }
         None => {
