@@ -274,9 +274,8 @@ impl Nominal {
         let backlash = HALF_A_LOST_MOTION_ARCSEC / half_arcsec;
         // Nor does a calibration know a spring, where loads go with the angle of the output or each log keeps to one.
         let [low, high] = table.torque_range_n_m().map(f64::from);
-        let wind_up_arcsec = nominal.wind_up_arcsec(high.max(-low)).max(LEAST_ARCSEC);
-        let stiffness = FARTHEST_WIND_UP_RAD * ARCSEC_PER_RAD / wind_up_arcsec;
-        let spread = Spread { stiffness, backlash, ..nominal.spread };
+        let any = FARTHEST_WIND_UP_RAD * ARCSEC_PER_RAD / nominal.wind_up_arcsec(high.max(-low)).max(LEAST_ARCSEC);
+        let spread = Spread { stiffness: any, backlash, ..nominal.spread };
         let (harmonics, backlash_arcsec) = (harmonics.collect(), 2.0 * half_arcsec);
         let friction_torque_n_m = dead_zone_n_m(table);
         Nominal { ratio, teeth: None, harmonics, backlash_arcsec, friction_torque_n_m, spread, ..nominal }

@@ -225,11 +225,14 @@ pub(super) fn torque_by_way(files: &[Recording], ratio: f64) -> f64 {
         let (angle, torque) = (&session.generator_rad, session.torque_n_m.as_deref().unwrap_or_default());
         let turns = turns(angle, TURNED_BACK_RAD);
         let turned = turns.windows(2).enumerate().filter(|(_, w)| w[0].0 * w[1].0 < 0.0);
+        let rise = |w: &[f64]| mean(&w[w.len() / 2..]) - mean(&w[..w.len() / 2]);
         let by_turn = turned.filter_map(|(k, w)| {
             let at = angle[..=k].iter().rposition(|psi| *psi == w[1].1)?;
             let before = torque.get(at.checked_sub(BESIDE_A_TURN.end)?..at - BESIDE_A_TURN.start)?;
             let after = torque.get(at + BESIDE_A_TURN.start + 1..=at + BESIDE_A_TURN.end)?;
-            Some(0.5 * w[1].0 * ratio.signum() * (mean(after) - mean(before)))
+            // A load that goes on at one rate does not change: the means are 13 rows apart, those of halves 4.
+            let change = mean(after) - mean(before) - 13.0 / 8.0 * (rise(before) + rise(after));
+            Some(0.5 * w[1].0 * ratio.signum() * change)
         });
         by_turn.collect()
     };
@@ -351,8 +354,7 @@ impl Rows {
     /// Correlation of the load with what the first waves of the output make of it, 0 to 1.
     pub(crate) fn load_with_output_angle(&self) -> f64 {
         let of = |value: fn(&State) -> f64| self.rows.iter().map(|row| value(&row.at)).collect::<Vec<f64>>();
-        let waves = [of(|_| 1.0), of(|at| at.output_rad.sin()), of(|at| at.output_rad.cos())];
-        correlation(&of(|at| at.torque_n_m), &waves)
+        correlation(&of(|at| at.torque_n_m), &[of(|_| 1.0), of(|at| at.output_rad.sin()), of(|at| at.output_rad.cos())])
     }
 
     /// Where an encoder lost its index, in what a model leaves, beside all `parts` that may be there: the log, the line

@@ -328,8 +328,8 @@ fn waves_of_load(rows: &Rows) -> Option<Vec<Vec<f64>>> {
     let [sine, cosine] = waves(1.0, &rows.output, &(0..rows.len()).collect::<Vec<usize>>());
     let by_angle = [vec![1.0; rows.len()], sine, cosine];
     let varies = about_mean(&rows.torque) > SAME_TORQUE * rows.load_scale();
-    let goes = varies && correlation(&rows.torque, &by_angle) > TURNS_WITH_THE_OUTPUT;
-    goes.then(|| by_angle.into_iter().skip(1).collect())
+    let goes = correlation(&rows.torque, &by_angle) > TURNS_WITH_THE_OUTPUT;
+    (varies && goes).then(|| by_angle[1..].to_vec())
 }
 
 /// Sum of squares that a law of the play leaves where the torque is around friction, freed of that.

@@ -283,14 +283,12 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
 /// Models of an unbalanced load: the load that gravity adds moves the torque at which the play turns over, so that the
 /// law which the play follows there shows only now.
 fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
-    // It is one with a spring that nobody knows.
-    if on.base.floating.iter().any(|of| of.name == WAVE_OF_LOAD) {
-        return Vec::new();
-    }
     let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
     if !plays.contains(&on.base.law) {
         plays.push(on.base.law);
     }
+    // It is one with a spring that nobody knows.
+    plays.retain(|_| on.base.floating.iter().all(|of| of.name != WAVE_OF_LOAD));
     let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
     let on_sample = thinned.as_ref().map_or(*on, |thinned| on.over(&thinned.rows, &thinned.base));
     plays.into_iter().map(|play| gravity_torque(play, on, &on_sample).variant(play.as_str())).collect()
