@@ -251,18 +251,14 @@ impl Base {
         // of the output, what of the error is the spring's.
         if nominal.teeth.is_none() {
             let scale = rows.load_scale().max(f64::MIN_POSITIVE);
-            let under = |column: &[f64], power: i32| -> Vec<f64> {
-                let of = |(value, torque): (&f64, &f64)| value * (torque.abs() / scale).powi(power);
-                column.iter().zip(&rows.torque).map(of).collect()
-            };
             let waves = waves_of_load(rows);
             let (powers, spread) = if waves.is_some() { (POWERS, nominal.spread.stiffness) } else { (1, HARDENING) };
             for power in 1..=powers {
-                add("stiffness under load", under(&wind_up, power), spread);
+                let harder = |(arcsec, torque): (&f64, &f64)| arcsec * (torque.abs() / scale).powi(power);
+                add("stiffness under load", wind_up.iter().zip(&rows.torque).map(harder).collect(), spread);
             }
-            for wave in waves.iter().flatten() {
-                add(WAVE_OF_LOAD, wave.clone(), FREE);
-                add(WAVE_OF_LOAD, under(wave, 1), FREE);
+            for wave in waves.into_iter().flatten() {
+                add(WAVE_OF_LOAD, wave, FREE);
             }
         }
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);

@@ -37,12 +37,15 @@ pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 pub(crate) use unit::Family;
 
 use crate::least_squares::FreeSpan;
+use crate::misfit::correlation;
 use faults::Findings;
 use log::Log;
 use raw::RawFile;
 
-/// What is left of a load is noise where it is no more than this of that from row to row. *Guess*.
-const NOISE_ALONE: f64 = 1.2;
+/// What is left of a load is noise, and no rounding, where it is this share of the load, … *Guesses*.
+const NOISE: Range<f64> = 1e-5..0.05;
+/// … and the error shows it by fewer than this many standard deviations. *Source*: by convention.
+const CERTAIN: f64 = 5.0;
 /// More sessions than a person makes. *Guess*.
 const MANY_SESSIONS: usize = 50;
 
@@ -301,15 +304,17 @@ pub(crate) fn parse_at_least(
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, notes, unusable: None })
 }
 
-/// A load that is one, or what the angle of the output and the way of a motion make of it, as a weight does, is that
-/// alone where all else of it is noise: a fit would take that noise for what tells a wind-up from waves of the output.
+/// A load that the angle of the output and the way of a motion make, as a weight does, is theirs alone where all else of
+/// it is noise that the error does not show: a fit would take it for what tells a wind-up from waves of the output.
 fn load_without_noise(session: &mut Session, ratio: f64) {
     let Some(torque) = &mut session.torque_n_m else { return };
     let wave = |of: fn(f64) -> f64| session.generator_rad.iter().map(|psi| of(psi / ratio)).collect();
-    let one = FreeSpan::default().beyond([vec![1.0; torque.len()]]);
-    let of_angle = [wave(f64::sin), wave(f64::cos), directions(&session.generator_rad)];
-    let rests = [one.freed(torque.clone()), one.beyond(of_angle).freed(one.freed(torque.clone()))];
-    if let Some(noise) = rests.iter().find(|rest| rms(rest) < NOISE_ALONE * white_noise([&rest[..]])) {
+    let of_angle = [vec![1.0; torque.len()], wave(f64::sin), wave(f64::cos), directions(&session.generator_rad)];
+    let span = FreeSpan::default().beyond(of_angle);
+    let noise = span.freed(torque.clone());
+    let error = span.freed(session.error_rad.clone());
+    let shown = correlation(&error, std::slice::from_ref(&noise)) * (noise.len() as f64).sqrt();
+    if shown < CERTAIN && NOISE.contains(&(rms(&noise) / rms(torque))) {
         torque.iter_mut().zip(noise).for_each(|(torque, noise)| *torque -= noise);
     }
 }
