@@ -241,14 +241,15 @@ impl Base {
             let per_s = behind(rows, &flank, half_backlash, lag_s).into_iter().map(|arcsec| arcsec / lag_s);
             add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
         }
-        // Nor does a catalogue print the drag of the output, which winds a drive up against its motion.
-        let against = |k: usize| -rows.direction[k] * nominal.ratio.signum() * nominal.slope_arcsec(rows.torque[k]);
+        // Nor does a catalogue print the drag of the output, which winds a drive up against its motion: by as much
+        // under every load, as lost motion is.
+        let against = |way: &f64| -way * nominal.ratio.signum() * nominal.slope_arcsec(0.0);
         let stated = nominal.teeth.is_some() && nominal.friction_torque_n_m > 0.0;
         let unknown_n_m = if stated { 0.0 } else { DRAG_OF_LOAD * rows.load_scale() };
-        add("drag", (0..rows.len()).map(against).collect(), unknown_n_m);
+        add("drag", rows.direction.iter().map(against).collect(), unknown_n_m);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
-        // Of a gear that is known by its ratio nothing says how its spring hardens, nor, where a load goes with the angle
-        // of the output, what of the error is the spring's.
+        // Of a gear that is known by its ratio nothing says how its spring hardens, nor, where a load goes with the
+        // angle of the output, what of the error is the spring's.
         if nominal.teeth.is_none() {
             let scale = rows.load_scale().max(f64::MIN_POSITIVE);
             let waves = waves_of_load(rows);
@@ -403,7 +404,8 @@ fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool>
         (0..rows.len()).map(|k| rows.torque[k].abs() <= near || flank[k].abs() < 0.999).collect();
     for session in &rows.sessions {
         for k in session.start + 1..session.end {
-            if flank[k] * flank[k - 1] < 0.0 {
+            // Lost motion is crossed where the drive turns.
+            if flank[k] * flank[k - 1] < 0.0 || nominal.teeth.is_none() && rows.direction[k] != rows.direction[k - 1] {
                 let around = k.saturating_sub(2).max(session.start)..(k + 1 + rows_of_crossing(rows)).min(session.end);
                 uncertain[around].fill(true);
             }

@@ -304,8 +304,8 @@ pub(crate) fn parse_at_least(
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, notes, unusable: None })
 }
 
-/// A load that the angle of the output and the way of a motion make, as a weight does, is theirs alone where all else of
-/// it is noise that the error does not show: a fit would take it for what tells a wind-up from waves of the output.
+/// A load that the angle of the output and the way of a motion make, as a weight does, is theirs alone where all else
+/// of it is noise that the error does not show: a fit would take it for what tells a wind-up from waves of the output.
 fn load_without_noise(session: &mut Session, ratio: f64) {
     let Some(torque) = &mut session.torque_n_m else { return };
     let wave = |of: fn(f64) -> f64| session.generator_rad.iter().map(|psi| of(psi / ratio)).collect();
