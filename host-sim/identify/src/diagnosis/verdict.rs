@@ -406,6 +406,7 @@ fn outside(
         || but(&selected.terms, k).any(|other| other.law.is(standing));
     let waves = waves_per_generator_turn(name, known, nominal);
     let line_of_generator = waves.is_some();
+    let once_in_a_turn = matches!(name, CauseName::GeneratorEncoderEccentricity | CauseName::OutputEncoderEccentricity);
     let stated = |order: &f64| nominal.harmonics.iter().any(|of| of.order_per_generator_turn == *order);
     let harmonic = known.parameters.get(ParameterName::Harmonic.as_str()).map(|harmonic| harmonic.value);
     let order = waves.or(harmonic.filter(|_| name == standing));
@@ -425,8 +426,8 @@ fn outside(
         (part_of_a_turn, "a wheel before the encoder, which repeats within this part of a turn"),
         (of_two_lobes, "the waves of any strain wave gear, which the model does not state"),
         (
-            (line_of_generator || name == CauseName::GeneratorEncoderEccentricity) && nominal.teeth.is_none(),
-            "the gear's own wheels, of which the teeth are not known, or the torque of the motor",
+            (line_of_generator || once_in_a_turn) && nominal.teeth.is_none(),
+            "the gear's own wheels, of which the teeth are not known, or a torque that goes with the angle",
         ),
         (line_of_generator && (name == standing || not_held_against_it), "the torque of the motor"),
     ];
