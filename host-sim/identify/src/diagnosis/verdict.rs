@@ -414,8 +414,8 @@ fn outside(
     let reasons = [
         (load_makes_it(Some(name), problem), "a load that was not recorded"),
         (
-            law.wrong.kin == Kin::Clearance && nominal.teeth.is_none() && nominal.friction_torque_n_m == 0.0,
-            "friction of the output, which was not given",
+            matches!(law.wrong.kin, Kin::Clearance | Kin::Drag) && nominal.teeth.is_none(),
+            "friction of the output, which a ratio does not say",
         ),
         // While something is left, what the model takes for known of the load and the play may be wrong as well.
         (
