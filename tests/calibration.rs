@@ -174,27 +174,6 @@ fn a_motor_zero_that_is_off_by_whole_turns_is_put_right_where_the_output_says_it
     assert!(said.contains("the table is worse than none here"), "{said}");
 }
 
-/// A drive with a hardening spring that lags by 20 arcsec whichever way it goes, at one pace: a delay between the
-/// angles would be much the same, and is not named.
-#[test]
-fn lost_motion_at_one_pace_is_no_delay() {
-    let log = log_of(101.0, 30.0, 0.0, 0.0);
-    let loaded = |(k, row): (usize, &str)| -> String {
-        let Some((before, output)) = row.rsplit_once(',').filter(|_| k > 0) else { return format!("{row},torque_n_m") };
-        // There under rising loads, back under falling ones, in five steps.
-        let way = if k > 3000 { -1.0 } else { 1.0 };
-        let load = way * (25.0 * ((k - 1) % 3000 / 600) as f64 - 50.0);
-        let arcsec = 6.0 * load / (1.0 + load.abs() / 50.0) - 20.0 * way;
-        format!("{before},{:.10},{load}", output.parse::<f64>().unwrap() + arcsec * TAU / 1_296_000.0)
-    };
-    let rows: Vec<String> = log.lines().enumerate().map(loaded).collect();
-    let desk = Desk::new();
-    desk.write("log.csv", &rows.join("\n"));
-    let found = desk.line("diagnose log.csv --ratio 101 --no-report --out out --json").done().json();
-    assert_eq!(found["verdict"], "explained", "{}", found["unexplained"]);
-    assert_eq!(found["causes"].as_array().unwrap().len(), 1, "{}", found["causes"]);
-}
-
 /// A motor encoder with an eccentric read head, by a quarter of a radian: the output departs from following it by as
 /// much. There is a table, and its inverse finds every target.
 #[test]

@@ -595,6 +595,38 @@ mod tests {
         (done.diagnosis.finding, done.recording.notes.clone(), done.diagnosis.text())
     }
 
+    /// What a log says of a drive known by its ratio, 95: each row has generator angle, error, arcsec, and load, N·m.
+    fn by_ratio(row: impl Fn(f64, f64) -> [f64; 3]) -> (Subject<'static>, Diagnosed) {
+        let (mut text, columns) = ("time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned(), ColumnMap::default());
+        let mut random = fastrand::Rng::with_seed(8);
+        for k in 0..12_000 {
+            let [psi, error, load] = row(f64::from(k), random.f64() - 0.5);
+            let read = error + 2.0 * random.f64();
+            text += &format!("{:.2},{psi:.6},{read:.4},{load:.4}\n", 0.01 * f64::from(k));
+        }
+        let (drive, text) = ((Drive::hhd_95(), GeneratorKind::Cam), text.into_bytes());
+        let mut subject = Subject::of_ratio(95.0, drive, ("gear.csv", text.clone(), &columns)).unwrap();
+        let rows = parse_rows("gear.csv", text, &columns, &mut subject).unwrap();
+        let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
+        (subject, done)
+    }
+
+    /// Way and generator angle at one pace, there and back in 4800 rows.
+    fn there_and_back(k: f64) -> (f64, f64) {
+        let k = k.rem_euclid(4800.0);
+        (if k < 2400.0 { 1.0 } else { -1.0 }, 0.05 * (2400.0 - (k - 2400.0).abs()))
+    }
+
+    /// Lost motion at one pace, of a hardening spring: a delay between the angles would be much the same.
+    #[test]
+    fn lost_motion_at_one_pace_is_no_delay() {
+        let (_, done) = by_ratio(|k, _| {
+            let ((way, psi), load) = (there_and_back(k), 25.0 * (k / 480.0).floor().rem_euclid(5.0) - 50.0);
+            [psi, 6.0 * load / (1.0 + load.abs() / 50.0) - 20.0 * way + 20.0 * (2.0 * psi + 0.4).sin(), load]
+        });
+        assert_eq!(done.diagnosis.finding, Finding::NothingFound, "{}", done.diagnosis.text());
+    }
+
     #[test]
     fn rows_that_are_all_set_aside_are_no_sound_drive() {
         let spur =
@@ -616,51 +648,37 @@ mod tests {
     #[test]
     fn a_ratio_alone_takes_spring_and_friction_from_the_rows() {
         let nominal = catalogue_drive();
-        let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
-        let (mut random, mut psi) = (fastrand::Rng::with_seed(8), 0.0);
-        for k in 0..12_000 {
-            let (way, load) = (if k % 4000 < 2500 { 1.0 } else { -1.0 }, 30.0 * (f64::from(k) / 300.0).sin());
-            psi += 0.05 * way;
+        let (subject, done) = by_ratio(|k, _| {
+            let ((way, psi), load) = (there_and_back(k), 30.0 * (k / 300.0).sin());
             let carries = load - 1.5 * way;
             let error = nominal.wind_up_arcsec(carries) + 0.5 * nominal.backlash_arcsec * carries.signum();
-            let error = error + 30.0 * (2.0 * psi + 0.4).sin() + 2.0 * random.f64();
-            text += &format!("{:.2},{psi:.6},{error:.4},{load:.4}\n", 0.01 * f64::from(k));
-        }
-        let (drive, columns) = ((Drive::hhd_95(), GeneratorKind::Cam), ColumnMap::default());
-        let mut subject = Subject::of_ratio(95.0, drive, ("gear.csv", text.clone().into_bytes(), &columns)).unwrap();
+            [psi, error + 30.0 * (2.0 * psi + 0.4).sin(), load]
+        });
         let spring = |of: &Nominal| of.wind_up_arcsec(25.0) - of.wind_up_arcsec(10.0);
         let (found, true_one) = (spring(&subject.nominal), spring(&nominal));
         assert!((found / true_one - 1.0).abs() < 0.05, "{found} for {true_one}");
         let found = subject.nominal.friction_torque_n_m;
         assert!((found / 1.5 - 1.0).abs() < 0.2, "{found} for 1.5");
-        let rows = parse_rows("gear.csv", text.as_bytes(), &columns, &mut subject).unwrap();
-        let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
         assert_eq!(done.diagnosis.finding, Finding::NothingFound, "{}", done.diagnosis.text());
-        let note = "on the wheel that turns, of 29.9, 0.0, 0.0, 0.0 arcsec, count as the gear's own";
+        let note = "on the wheel that turns, of 30.0, 0.1, 0.0, 0.0 arcsec, count as the gear's own";
         assert!(done.recording.notes.iter().any(|of| of.contains(note)), "{:?}", done.recording.notes);
-        let other = Subject::of_ratio(1.0, (Drive::hhd_95(), GeneratorKind::Cam), ("g.csv", Vec::new(), &columns));
+        let (drive, columns) = ((Drive::hhd_95(), GeneratorKind::Cam), ColumnMap::default());
+        let other = Subject::of_ratio(1.0, drive, ("g.csv", Vec::new(), &columns));
         assert!(other.err().unwrap().to_string().starts_with("--ratio: found 1, allowed: 2 to 10000"));
     }
 
     /// An arm: its weight goes with the angle of the output, and the noise of its torque is no word on whose a wave is.
     #[test]
     fn a_weight_leaves_open_whose_a_wave_of_the_output_is() {
-        let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
-        let (mut random, mut loads) = (fastrand::Rng::with_seed(3), Vec::new());
-        for k in 0..12_000 {
-            let psi = 300.0 * (1.0 - (f64::from(k) * std::f64::consts::PI / 3000.0).cos());
-            let output = psi / 95.0;
-            let load = 30.0 * (output - 0.4).sin();
-            loads.push(load);
-            let error = 8.0 * load + 30.0 * (output + 1.1).sin() + 20.0 * (2.0 * psi).sin() + 2.0 * random.f64();
-            text += &format!("{:.2},{psi:.6},{error:.4},{:.4}\n", 0.01 * f64::from(k), load + 0.2 * random.f64() - 0.1);
-        }
-        let (drive, columns) = ((Drive::hhd_95(), GeneratorKind::Cam), ColumnMap::default());
-        let mut subject = Subject::of_ratio(95.0, drive, ("arm.csv", text.clone().into_bytes(), &columns)).unwrap();
-        let rows = parse_rows("arm.csv", text.as_bytes(), &columns, &mut subject).unwrap();
-        let read = rows.sessions[0].torque_n_m.iter().flatten();
-        assert!(read.zip(loads).all(|(read, load)| (read - load).abs() < 0.01));
-        let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
+        let angle = |k: f64| 300.0 * (1.0 - (k * std::f64::consts::PI / 3000.0).cos());
+        let weight = |k: f64| 30.0 * (angle(k) / 95.0 - 0.4).sin();
+        let (_, done) = by_ratio(|k, noise| {
+            let (psi, load) = (angle(k), weight(k));
+            let error = 8.0 * load + 30.0 * (psi / 95.0 + 1.1).sin() + 20.0 * (2.0 * psi).sin();
+            [psi, error, load + 0.2 * noise]
+        });
+        let read = done.recording.sessions[0].torque_n_m.iter().flatten();
+        assert!(read.zip(0..).all(|(read, k)| (read - weight(f64::from(k))).abs() < 0.01));
         assert_ne!(done.diagnosis.finding, Finding::FaultFound, "{}", done.diagnosis.text());
         assert!(done.recording.notes.iter().any(|note| note == GOES_WITH_OUTPUT), "{:?}", done.recording.notes);
     }

@@ -405,8 +405,7 @@ fn outside(
         || name == CauseName::EncoderSubdivision
         || but(&selected.terms, k).any(|other| other.law.is(standing));
     let waves = waves_per_generator_turn(name, known, nominal);
-    let line_of_generator = waves.is_some();
-    let once_in_a_turn = matches!(name, CauseName::GeneratorEncoderEccentricity | CauseName::OutputEncoderEccentricity);
+    let once = matches!(name, CauseName::GeneratorEncoderEccentricity | CauseName::OutputEncoderEccentricity);
     let stated = |order: &f64| nominal.harmonics.iter().any(|of| of.order_per_generator_turn == *order);
     let harmonic = known.parameters.get(ParameterName::Harmonic.as_str()).map(|harmonic| harmonic.value);
     let order = waves.or(harmonic.filter(|_| name == standing));
@@ -426,10 +425,10 @@ fn outside(
         (part_of_a_turn, "a wheel before the encoder, which repeats within this part of a turn"),
         (of_two_lobes, "the waves of any strain wave gear, which the model does not state"),
         (
-            (line_of_generator || once_in_a_turn) && nominal.teeth.is_none(),
+            (waves.is_some() || once) && nominal.teeth.is_none(),
             "the gear's own wheels, of which the teeth are not known, or a torque that goes with the angle",
         ),
-        (line_of_generator && (name == standing || not_held_against_it), "the torque of the motor"),
+        (waves.is_some() && (name == standing || not_held_against_it), "the torque of the motor"),
     ];
     reasons.into_iter().find(|(applies, _)| *applies).map(|(_, reason)| reason)
 }
