@@ -214,7 +214,7 @@ impl Calibrate {
 
     /// Says what to record.
     fn write_plan(&self, context: &Context, prior: &Prior<'_>) -> Result<(), Failure> {
-        let bench = self.bench.bench(self.columns.rate_hz(), prior.nominal.temperature_c)?;
+        let bench = self.bench.bench(self.columns.rate, prior.nominal.temperature_c)?;
         let mut planned = plan(prior, &bench).map_err(bad_input)?;
         planned.command.clone_from(&context.command);
         let out = context.out_for_plan(PLAN_BEGINS)?;

@@ -114,11 +114,6 @@ impl Context {
         }
     }
 
-    /// Whether `--set` sets this field.
-    pub(super) fn sets_field(&self, path: &str) -> bool {
-        self.set_to(path).is_some()
-    }
-
     /// The last value that `--set` gives to this field.
     pub(super) fn set_to(&self, path: &str) -> Option<&str> {
         let assignments = self.common.sets.iter().flat_map(|set| set.split(','));

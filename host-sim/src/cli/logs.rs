@@ -17,7 +17,7 @@ pub(super) struct LogOptions {
     columns: String,
     /// Rows in a second, Hz, where a file has no time [default: no time]
     #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
+    pub(super) rate: Option<f64>,
     /// Torque at the output for an ampere, N.m, where the torque column is a current in A or mA [default: none]
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     torque_constant: Option<f64>,
@@ -27,10 +27,5 @@ impl LogOptions {
     /// The mapping that they say.
     pub(super) fn map(&self) -> Result<ColumnMap, Failure> {
         ColumnMap::of_options(&self.columns, self.rate, self.torque_constant).map_err(bad_input)
-    }
-
-    /// Rows in a second, if that is said.
-    pub(super) fn rate_hz(&self) -> Option<f64> {
-        self.rate
     }
 }

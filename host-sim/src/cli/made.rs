@@ -102,7 +102,7 @@ pub(super) fn as_sold(context: &Context, made: MadeDrive) -> Result<MadeDrive, F
     let guessed = cup_and_balls(&context.with_sets(drive.clone())?).map(|(path, value)| (path, value, GUESSED));
     let kappa = (CONTACT_TEETH.contains(&drive.flexspline.teeth))
         .then(|| ("output.contact_compliance", Drive::CATALOGUE_CONTACT.to_string(), CONTACT));
-    let open = guessed.into_iter().chain(kappa).filter(|(path, ..)| !context.sets_field(path));
+    let open = guessed.into_iter().chain(kappa).filter(|(path, ..)| context.set_to(path).is_none());
     let mut sets = Vec::new();
     for (path, value, why) in open {
         sets.push(format!("{path}={value}"));

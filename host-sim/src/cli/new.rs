@@ -421,7 +421,7 @@ fn run_under_load(
         progress.set(runs, 0, what);
         runs += 1;
     };
-    let relief = relieve_tips(&drive, generator, torque_n_m, !context.sets_field(TIP_RADIUS), &mut report);
+    let relief = relieve_tips(&drive, generator, torque_n_m, context.set_to(TIP_RADIUS).is_none(), &mut report);
     let mut under = UnderLoad { torque_n_m, generator, tips_lowered_mm: 0.0, tip_contact: None, not_solved: None };
     match relief {
         Ok(relief) => {

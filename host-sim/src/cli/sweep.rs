@@ -211,7 +211,7 @@ impl PlanCommand {
             if let Some(torque) = self.torque_n_m.filter(|torque| !(*torque > 0.0 && torque.is_finite())) {
                 return Err(Failure::BadInput(format!("--torque-n-m: found {torque}, allowed: above 0")));
             }
-            if let Some(field) = self.vary.iter().find(|field| context.sets_field(&field.path)) {
+            if let Some(field) = self.vary.iter().find(|field| context.set_to(&field.path).is_some()) {
                 return Err(Failure::BadInput(format!(
                     "--set {0}: found it with --vary {0}, which contradicts it; give one of the two",
                     field.path
