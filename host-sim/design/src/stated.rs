@@ -158,6 +158,17 @@ impl Stated {
         let mut stated: Stated = serde_json::from_value(numbers.into()).ok()?;
         stated.source = section.given(file, "source", text);
         stated.completes_model = section.given(file, "completes_model", yes_or_no);
+        // No drive winds up by a radian: what does is in another unit.
+        let k = [stated.k1_n_m_per_rad, stated.k2_n_m_per_rad, stated.k3_n_m_per_rad];
+        let k = k.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        if let Some(load) = stated.t1_n_m.or(stated.t2_n_m).or(stated.rated_torque_n_m).filter(|load| k < *load) {
+            let what = format!(
+                "found K of {k} N·m/rad, by which {load} N·m turn the output by more than a radian; catalogues print \
+                 10⁴ N·m/rad: is it {}?",
+                short(1e4 * k)
+            );
+            file.refuse_whole("data_sheet", what);
+        }
         // The rated torque may be below T2, even T1: catalogues have it so at i = 50 (CSG-32-50, HFUC-90-50).
         let rated_n_m = stated.rated_torque_n_m.filter(|_| stated.t2_n_m.is_none());
         for (name, above) in [("t2", stated.t2_n_m), ("rated_torque", rated_n_m)] {
@@ -584,6 +595,7 @@ mod tests {
         for (body, place, words) in [
             ("k1 = 5", "d.toml:3", "k1_n_m_per_rad"),
             ("k2_n_m_per_rad = -5", "d.toml:3", "found -5"),
+            ("t2_n_m = 48\nk1_n_m_per_rad = 3.1", "", "found K of 3.1 N·m/rad, by which 48 N·m turn the output"),
             ("t1_n_m = 25\nt2_n_m = 7", "", "found t1 25.0 and t2 7.0, allowed: t1 below t2"),
         ] {
             let error = read(body).unwrap_err().to_string();
