@@ -131,8 +131,8 @@ impl<'a> DriveKnown<'a> {
     /// The table against the frames of the animation, which made no table.
     fn check_fresh(&self) -> Option<[f64; 2]> {
         // What a data sheet added is known from what made the table alone.
-        let is_bare = self.subject.info.is_some() || self.subject.table.sheet_scatter().is_none();
-        let animation = self.subject.animation.as_ref().ok().filter(|_| self.is_fem() && is_bare)?;
+        let compares = self.is_fem() && (self.subject.info.is_some() || self.subject.table.sheet_scatter().is_none());
+        let animation = self.subject.animation.as_ref().ok().filter(|_| compares)?;
         let misses: Vec<f64> = animation
             .rows
             .iter()
@@ -221,7 +221,7 @@ impl<'a> DriveKnown<'a> {
         };
         let mut series: Vec<ChartSeries> = WAYS.into_iter().enumerate().map(of).collect();
         // The FEM lacks what a data sheet adds.
-        let is_bare = self.subject.info.is_none_or(|info| info.completed.is_none());
+        let is_bare = self.subject.table.sheet_scatter().is_none();
         if let Some(a) = self.subject.animation.as_ref().ok().filter(|_| is_bare) {
             let point = vec![[a.torque_n_m, mean_arcsec(a)]];
             series.push(ChartSeries::new("forward, fresh FEM", Mark::Points, 2, point));
@@ -639,9 +639,9 @@ fn reading_section() -> PageSection {
         PageBlock::paragraph(format!("{SIGNS} The flexspline is fixed, the circular spline is the output.")),
         PageBlock::paragraph(
             "Fresh FEM means runs that made none of the tables, by the same model: agreement says that the table \
-             holds what the model says, not that the model holds what a real drive does. Plane strain, quasi-static: \
-             the cup of the flexspline, its skew, lubricant and speed are left out. Pointing along figure 2 turns the \
-             drive of figure 1.",
+             holds what the model says, not that the model holds what a real drive does. Teeth and rim are a slice in \
+             plane strain, quasi-static; a cup or sleeve acts on it by the stiffness of its shell, where the drive has \
+             one. Lubricant and speed are left out. Pointing along figure 2 turns the drive of figure 1.",
         ),
     ])
 }
