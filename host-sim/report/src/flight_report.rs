@@ -77,9 +77,9 @@ fn tracking(flight: &Flight, results: &Results) -> PageSection {
             settles.map_or("–".into(), |seconds| settles_in(seconds[k]).into()),
         ]
     };
-    let caption = "Output less target; speed of the output less the target's while that is even; time to settle after \
-                   a slew";
-    let header = ["Controller", "rms", "largest", "velocity ripple", "settles in"];
+    let caption = "Output less target; speed of the output less the target's while that is even; time after a slew \
+                   until it stays within 2″";
+    let header = ["Controller", "rms", "largest", "velocity ripple", "settles"];
     let table = PageBlock::table(caption, &header, CONTROLLERS.iter().enumerate().map(row).collect());
     let over_time = |id, title, caption, y, column: usize| {
         let series = drawn(|k| flight.flown[k].rows.iter().map(|row| [row[0], row[column]]).collect());
@@ -163,10 +163,10 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> PageSection {
 
 fn reading() -> PageSection {
     PageSection::reading(vec![PageBlock::paragraph(
-        "The unit has wind-up, clearance and tooth ripple of the contact FEM of HHD-95, is 6 % stiffer with 2″ more \
-         clearance, and has lines of eccentric wheels, pitch errors and an eccentric encoder that the nominal table \
-         does not know. The two error maps hold the unit's own error over the angles, recorded without noise at the \
-         mean load. The ideal knows the unit's own model and the true torque; its residual is the servo's: \
-         friction, gusts, reversals. Friction is that of an eRob80 of ratio 100 as identified by Rhoban/bam.",
+        "The unit has wind-up, clearance and tooth ripple of the drive of --tables, else of HHD-95, is 6 % stiffer \
+         with 2″ more clearance, and has lines of eccentric wheels, pitch errors and an eccentric encoder that the \
+         nominal table does not know. Both error maps hold the unit's own error over the angles, at the mean load, \
+         also where gravity varies. The ideal knows the unit's own model and the true torque; its residual is the \
+         servo's: friction, gusts, reversals. Friction is that of an eRob80, ratio 100, by Rhoban/bam.",
     )])
 }

@@ -116,7 +116,7 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         "rms ″",
         "max ″",
         "ripple ″/s",
-        "settles in"
+        "settles ±2″"
     );
     let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(ByController::all);
     let settles = results.settle_s.as_ref().map(ByController::all);
