@@ -40,8 +40,8 @@ pub enum FmuExportError {
     },
     /// No library was found.
     #[error(
-        "found no library for an FMU in this program or beside it. In a checkout run: cargo build --release -p \
-         flexspline-fmu, and give --library target/release/{built}"
+        "found no library for an FMU in this program or beside it; a program of a release has it inside. In a checkout \
+         run: cargo build --release -p flexspline-fmu, and give --library target/release/{built}"
     )]
     Missing {
         /// The file that a build makes.
