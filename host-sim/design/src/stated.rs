@@ -451,12 +451,10 @@ impl SheetBeside {
             "ratio"
         );
         for row in &self.beside {
+            let is_least = row.figure == "ratcheting_torque_n_m" && row.computed >= Some(row.stated);
             let computed = row.computed.map_or_else(|| "-".to_owned(), short);
-            // A ratio far below 1 is a number, too.
-            let digits = |ratio: f64| if ratio.abs() < 0.1 { 4 } else { 2 };
-            let shown =
-                |ratio: f64| if ratio < 1e4 { format!("{ratio:.0$}", digits(ratio)) } else { format!("{ratio:.2e}") };
-            let ratio = row.ratio.map_or_else(|| "-".to_owned(), shown);
+            let computed = if is_least { format!("≥{computed}") } else { computed };
+            let ratio = row.ratio.map_or_else(|| "-".to_owned(), short);
             lines += &format!(
                 "  {:<24}{:>12}{computed:>12}{ratio:>11}  {}\n",
                 row.figure,
@@ -507,26 +505,17 @@ impl SheetBeside {
 
     /// Where assumed loads come from; nothing where all are stated.
     pub fn assumed_in_words(&self) -> Option<String> {
+        let Loads { t1_n_m: t1, t2_n_m: t2, .. } = Loads::up_to(100.0);
+        let from = if self.stated.is_rated_within_t2() {
+            "the stated rated torque is not above T2, and K3 takes a larger load"
+        } else if self.assumed.len() == 3 {
+            "the rated torque is what a table of this generator spans by default"
+        } else {
+            "from the stated ones"
+        };
         let keys = self.assumed.join(", ");
-        let usual = Loads::up_to(100.0);
-        let proportion = format!("T1 : T2 : rated = {} : {} : 100, as of a CSF-25-100", usual.t1_n_m, usual.t2_n_m);
-        if self.stated.is_rated_within_t2() {
-            let rated = short(self.stated.rated_torque_n_m.unwrap_or_default());
-            let guessed = if self.assumed.contains(&"t1_n_m") {
-                "t1_n_m, and the largest load, which K3 takes, are guessed"
-            } else {
-                "the largest load, which K3 takes, is guessed"
-            };
-            return Some(format!("the rated torque of {rated} N·m is not above T2, so {guessed}: {proportion}"));
-        }
-        match self.assumed.len() {
-            0 => None,
-            3 => Some(format!(
-                "not stated, so guessed: {keys}. The rated torque is what a table of this generator spans by default; \
-                 {proportion}"
-            )),
-            _ => Some(format!("not stated, so guessed: {keys}, from those that are; {proportion}")),
-        }
+        let what = format!("guessed: {keys}; {from}; T1 : T2 : rated = {t1} : {t2} : 100, as of a CSF-25-100");
+        (!keys.is_empty()).then_some(what)
     }
 }
 
@@ -688,14 +677,14 @@ mod tests {
         let text = shown.text();
         assert!(
             text.contains("T2 108 largest 150 (assumed) N·m")
-                && text.contains("rated torque of 99 N·m is not above T2, so the largest load, which K3 takes, is"),
+                && text.contains("guessed: rated_torque_n_m; the stated rated torque is not above T2"),
             "{text}"
         );
         let stated = Stated { t1_n_m: None, rated_torque_n_m: Some(108.0), ..shown.stated };
         let (loads, assumed) = (stated.loads(20.0), stated.assumed());
         assert_eq!((loads.largest_n_m, &assumed[..]), (150.0, &["t1_n_m", "rated_torque_n_m"][..]));
         let said = SheetBeside { stated, loads, assumed, ..shown }.assumed_in_words().unwrap();
-        assert!(said.contains("108 N·m is not above T2, so t1_n_m, and the largest load"), "{said}");
+        assert!(said.contains("guessed: t1_n_m, rated_torque_n_m; the stated"), "{said}");
     }
 
     /// Friction of the flanks widens the loop; without it the loop is the clearance. A torque that the drive bears is
