@@ -230,7 +230,12 @@ impl Simulate {
 
     /// Why there are no results; the rows so far are written.
     fn failed(&self, context: &Context, out: &FilePath, error: SimulateError) -> Failure {
-        if let (true, Some(residuals)) = (context.verbose(), error.of_solver().and_then(SolveError::residuals)) {
+        let of_solver = match &error {
+            SimulateError::Solve(of_solver) => Some(of_solver),
+            SimulateError::Unfinished(unfinished) => Some(&unfinished.error),
+            _ => None,
+        };
+        if let (true, Some(residuals)) = (context.verbose(), of_solver.and_then(SolveError::residuals)) {
             say::talk(&format!("relative residual by iteration: {residuals}"));
         }
         let SimulateError::Unfinished(unfinished) = &error else { return refused_or_failed(error) };
