@@ -320,6 +320,7 @@ fn described(figure: &'static str) -> (&'static str, &'static str, &'static [&'s
 const RATED: &str = "rated_torque_n_m";
 
 /// Computes what is stated, at a temperature; the ratcheting torque, which takes longest, if it is to be `looked_for`.
+/// Stiffness has in series what a table was completed with up to T1, up to T2 and above: `added`, rad/(N·m).
 pub fn beside(
     drive: &Drive,
     kind: GeneratorKind,
@@ -327,6 +328,7 @@ pub fn beside(
     stated: &Stated,
     settings: SolverSettings,
     looked_for: bool,
+    added: [f64; 3],
 ) -> SheetBeside {
     let loads = stated.loads(drive.rated_torque_n_m(kind));
     let (sheet, done) = data_sheet(drive, kind, temperature_c, loads, POSITIONS, settings);
@@ -341,13 +343,15 @@ pub fn beside(
     let held_n_m = further(ratcheting, &|problem, wanted| held_n_m(problem, loads, wanted));
     let starting_n_m = further(stated.starting_torque_n_m, &|problem, _| starting_n_m(&problem));
     let arcmin = |arcsec: Option<f64>| arcsec.map(|x| x / 60.0);
+    let k = [sheet.k1_n_m_per_rad, sheet.k2_n_m_per_rad, sheet.k3_n_m_per_rad];
+    let [k1, k2, k3] = std::array::from_fn(|range| k[range].map(|fem| (fem.recip() + added[range]).recip()));
     // The error of tips that clash is no accuracy of the drive.
     let clash = sheet.tip_contact.filter(|tips| tips.counts());
     let accuracy = arcmin(sheet.kinematic_error_pp_arcsec.filter(|_| clash.is_none()));
     let figures = [
-        ("k1_n_m_per_rad", stated.k1_n_m_per_rad, sheet.k1_n_m_per_rad),
-        ("k2_n_m_per_rad", stated.k2_n_m_per_rad, sheet.k2_n_m_per_rad),
-        ("k3_n_m_per_rad", stated.k3_n_m_per_rad, sheet.k3_n_m_per_rad),
+        ("k1_n_m_per_rad", stated.k1_n_m_per_rad, k1),
+        ("k2_n_m_per_rad", stated.k2_n_m_per_rad, k2),
+        ("k3_n_m_per_rad", stated.k3_n_m_per_rad, k3),
         ("hysteresis_loss_arcmin", stated.hysteresis_loss_arcmin, loop_arcmin),
         ("lost_motion_arcmin", stated.lost_motion_arcmin, arcmin(sheet.lost_motion_arcsec)),
         ("ratcheting_torque_n_m", stated.ratcheting_torque_n_m, held_n_m),
@@ -435,7 +439,7 @@ fn starting_n_m(problem: &Problem) -> Result<f64, SolveError> {
 /// Reason of the difference between the stiffness of a table and that of a data sheet.
 pub const TWO_SETS_OF_K: &str = "K of a table is read off its nodes, with ranges that end at 21, 72 and 100 % of its \
                                  largest torque, in the middle of both directions; K beside the data sheet is by \
-                                 secants of the FEM to the torques of the sheet";
+                                 secants of the FEM, with what completed the table, to the torques of the sheet";
 
 impl SheetBeside {
     /// In lines, as the commands print it.
@@ -713,7 +717,7 @@ mod tests {
             ..Stated::default()
         };
         let of = |drive: &Drive| {
-            beside(drive, GeneratorKind::Cam, 20.0, &stated, SolverSettings::fast(MeshLevel::Coarse), true)
+            beside(drive, GeneratorKind::Cam, 20.0, &stated, SolverSettings::fast(MeshLevel::Coarse), true, [0.0; 3])
         };
         let get =
             |of: &SheetBeside, name: &str| of.beside.iter().find(|row| row.figure == name).unwrap().computed.unwrap();

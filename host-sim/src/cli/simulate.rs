@@ -170,7 +170,8 @@ impl Simulate {
         // Stiffness hardly depends on the mesh: K1 to K3 of CSG-25-80 by 0.1 %.
         let mesh = if self.ratcheting { settings.solver.mesh } else { MeshLevel::Coarse };
         let coarse = SolverSettings { mesh, ..settings.solver };
-        let beside = |stated| beside(&drive, settings.generator, temperature_c, stated, coarse, self.ratcheting);
+        let beside =
+            |stated| beside(&drive, settings.generator, temperature_c, stated, coarse, self.ratcheting, [0.0; 3]);
         let (run, sheet) = rayon::join(run, || stated.as_ref().map(beside));
         drop(progress);
         let mut simulation = match run? {

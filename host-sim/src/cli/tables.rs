@@ -182,12 +182,10 @@ impl Tables {
         }
         if let (Some(stated), None) = (&stated, &self.from_samples) {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
-            let reference_c = drive.temperature.reference_c;
             made.par_iter_mut().for_each(|table| {
-                let sheet = beside(&drive, table.kind, reference_c, stated, settings, false);
-                if table.info.completed.is_none() {
-                    table.info.cautions.extend(sheet.caution());
-                }
+                let added = table.info.completed.as_ref().map_or([0.0; 3], |of| of.spring.compliance_rad_per_n_m);
+                let sheet = beside(&drive, table.kind, drive.temperature.reference_c, stated, settings, false, added);
+                table.info.cautions.extend(sheet.caution());
                 table.info.data_sheet = Some(sheet);
             });
         }
