@@ -534,6 +534,37 @@ fn a_sound_drive_loses_no_index() {
     assert!(alarms.len() as f64 <= 0.01 * seeds as f64, "{} in {seeds}:\n{}", alarms.len(), alarms.join("\n"));
 }
 
+/// There and back once, without a rest: the play looks like a step at the only turn. A table of the way there has none,
+/// and its replay shows the error of that.
+#[test]
+fn the_play_of_a_single_turn_is_no_lost_index() {
+    for seed in 0..3 {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let (mut there_and_back, mut psi) = (Bench::default(), 0.0_f64);
+        for k in 0..4200 {
+            let pace = 0.314 * ((2100.0 - f64::from(k)) / 21.0).clamp(-1.0, 1.0);
+            psi += pace;
+            let error = 18.0 * (2.0 * psi).cos() - 17.6 * pace.signum() + 1.5 * normal(&mut random);
+            there_and_back.time_s.push(0.05 * f64::from(k));
+            there_and_back.generator_rad.push(psi);
+            there_and_back.output_rad.push(psi / RATIO + error * ARCSEC);
+        }
+        let made = |bench: &Bench| {
+            calibrate(&[read(bench.csv().as_bytes()).unwrap()], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap()
+        };
+        let both_ways = made(&there_and_back).calibration;
+        assert_eq!(both_ways.data_faults, [], "seed {seed}");
+        assert!(both_ways.held_out.rms_after_arcsec < 1.7, "seed {seed}: {:?}", both_ways.held_out);
+        let mut there = there_and_back.clone();
+        [&mut there.time_s, &mut there.generator_rad, &mut there.output_rad].map(|values| values.truncate(2000));
+        let image = made(&there).table.image;
+        let table = Table::check(&image).unwrap();
+        let text = there_and_back.csv().into_bytes();
+        let rows = replay::read("m.csv", text, &ColumnMap::default(), &table, 20.0, true).unwrap();
+        assert!(rows.faults.is_empty() && replay::replay(&table, &rows.rows, None).1.rms_residual_arcsec > 15.0);
+    }
+}
+
 #[test]
 fn teeth_that_slide_twice_are_no_lost_index() {
     let pitch = std::f64::consts::TAU / 190.0;

@@ -668,7 +668,7 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         let recorded = Recorded::of(&files, &prior);
         let rows = settled(&files, &prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
         let none = Model { chosen: Vec::new(), coefficients: Vec::new(), scales: recorded.scales };
-        let Some((_, line, size)) = rows.lost_index(&none, &[]) else { break };
+        let Some((_, line, size)) = rows.lost_index(&none, &recorded.shown(PartName::ALL, &prior)) else { break };
         part(&mut log, line, size, &prior);
     }
     if set_anew(std::slice::from_ref(&log), &prior).is_some() {

@@ -28,8 +28,6 @@ const BEYOND_OTHERS: f64 = 0.1;
 const ENOUGH_FILES: usize = 3;
 /// Rows that are fitted, at most; of longer records every n-th.
 pub(super) const MOST_ROWS: usize = 40_000;
-/// A reversal is one if the generator goes back by this share of its usual step.
-const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by this multiple of the play.
 const SETTLED: f64 = 1.5;
 
@@ -279,7 +277,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
         let begin = all.rows.len();
         for (session, number) in file.sessions.iter().zip(sessions.by_ref()) {
             let settle_rad = SETTLED * play_rad * prior.nominal.ratio.abs();
-            let mut ways = directions(session, prior.nominal.ratio, recorded.step_rad, settle_rad);
+            let mut ways = directions(session, prior.nominal.ratio, settle_rad);
             held_by_load(&mut ways, session, recorded.scales.friction_n_m, settle_rad);
             let speeds = speeds_rad_s(session, prior.nominal.ratio);
             let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
@@ -435,13 +433,19 @@ impl Rows {
     }
 }
 
-/// Direction of the output in each row; `None` before the first motion and until the play is through after a reversal.
-fn directions(session: &Session, ratio: f64, step_rad: f64, settle_rad: f64) -> Vec<Option<f64>> {
-    let turns = turns(&session.generator_rad, TURNED_ROUND * step_rad);
-    let settled = |(psi, (way, turned_at)): (&f64, (f64, f64))| {
-        (way != 0.0 && (psi - turned_at).abs() >= settle_rad).then_some(way * ratio.signum())
+/// Direction of the output in each row; `None` before the first motion, where it begins to turn back, and until the
+/// play is through after a reversal.
+fn directions(session: &Session, ratio: f64, settle_rad: f64) -> Vec<Option<f64>> {
+    let angle = &session.generator_rad;
+    let turns = turns(angle, TURNED_BACK_RAD);
+    let settled = |(psi, (way, turned_at)): (&f64, &(f64, f64))| {
+        (*way != 0.0 && (psi - turned_at).abs() >= settle_rad).then_some(way * ratio.signum())
     };
-    session.generator_rad.iter().zip(turns).map(settled).collect()
+    let mut ways: Vec<Option<f64>> = angle.iter().zip(&turns).map(settled).collect();
+    for (turned, pair) in turns.windows(2).enumerate().filter(|(_, pair)| pair[0].0 != pair[1].0) {
+        (0..=turned).rev().take_while(|row| angle[*row] != pair[1].1).for_each(|row| ways[row] = None);
+    }
+    ways
 }
 
 /// Takes the direction off rows at no load that still lie on the flank where a load left them: until the play is
@@ -468,10 +472,14 @@ mod tests {
         psi.extend((1..=20).map(f64::from));
         psi.extend((0..15).map(|k| 19.0 - f64::from(k)));
         let session = Session { generator_rad: psi, error_rad: vec![0.0; 40], ..Session::default() };
-        let ways = directions(&session, 100.0, 1.0, 3.0);
+        let ways = directions(&session, 100.0, 3.0);
         assert_eq!(ways[..7], [None; 7]);
         assert_eq!((ways[7], ways[24], ways[25], ways[26], ways[27]), (Some(1.0), Some(1.0), None, None, Some(-1.0)));
         // An output that turns against the generator.
-        assert_eq!(directions(&session, -100.0, 1.0, 3.0)[24], Some(-1.0));
+        assert_eq!(directions(&session, -100.0, 3.0)[24], Some(-1.0));
+        // Rows that have turned back by less than what says so.
+        let session = Session { generator_rad: vec![0.0, 0.5, 1.0, 1.0, 0.995, 0.985, 0.9], ..Session::default() };
+        let there = Some(1.0);
+        assert_eq!(directions(&session, 100.0, 0.0), [None, there, there, there, None, None, Some(-1.0)]);
     }
 }
