@@ -26,8 +26,8 @@ use flexspline_report::calibration_report;
 ///
 /// Subtracts the nominal model or table from the measurement and fits the residual with smooth parts: wind-up over
 /// torque, play by direction, curves over generator, tooth and output angle, temperature. A part is kept if it improves
-/// the prediction of files or blocks that were left out of the fit. Writes calibrated.fxt, .h and .rs,
-/// calibration.json and report.html.
+/// the prediction of files or blocks that were left out of the fit. Writes calibrated.fxt, .h and .rs, for readings of
+/// the output's encoder as they are, calibration.json and report.html.
 ///
 /// Of a log in which the generator stands and the load goes round it makes no table, but says by how much the output
 /// gives way by play, and whether the loop rejects play or contact of curved bodies (Hertz): torque_loop.json.

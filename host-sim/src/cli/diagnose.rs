@@ -31,7 +31,7 @@ use flexspline_report::diagnosis_report::{self, DiagnosisSources};
 /// nominal.toml, or with --drive beside --tables. Of two tables it writes the one that leaves less error in rows that
 /// took no part, if it leaves less than none, and less than the nominal table or no more than the nominal model: that
 /// of the causes as <G>-extended.fxt, that of a calibration of the same rows as calibrated.fxt, each with .json, .rs
-/// and .h.
+/// and .h. Neither has an error that was found in the output's encoder; calibrated.fxt of `flexspline calibrate` does.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\

@@ -775,7 +775,8 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     };
     let offsets = Reading::of_logs(OFFSET, files, rows.means_arcsec.iter().enumerate().map(offset));
     readings.extend(offsets);
-    notes.extend(split.then(|| SPLIT_BY.to_owned()));
+    let of_encoder = model.of(PartName::OutputAngle).map(|_| WITH_ENCODER);
+    notes.extend(if split { Some(SPLIT_BY) } else { of_encoder }.map(str::to_owned));
     let of_whom = |changes: Vec<(PartName, f64)>| {
         let changing = &known_with(&[&beside[..], &changes].concat())?;
         let (model, known, changes, has_torque) = (&model, &known, &changes, recorded.has_torque);
@@ -895,6 +896,10 @@ fn dead_zone(rows: &Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recor
 const SPLIT_BY: &str = "the split takes for an encoder's what changes neither with the load nor with the flank: of \
                         waves of displaced wheels at least half does; an error of a gear that does not counts as the \
                         encoder's";
+
+/// What a table holds that was not split.
+const WITH_ENCODER: &str = "the curve over the output angle holds the error of the output's encoder, as the readings \
+                            do: --split also makes gear.fxt, without what is the encoder's";
 
 /// A part that is not fitted, and why.
 type Without = (PartName, &'static str);

@@ -90,7 +90,8 @@ impl Evaluation {
             or_none(extended)
         );
         if self.not_applied.iter().any(|cause| cause.reason == OF_THE_OUTPUT_ENCODER) {
-            text += "; without the error of the output's encoder, which no table has and replay counts";
+            text += "; these are without the error found in the output's encoder, which calibrated.fxt of `calibrate` \
+                     has, for readings as they are";
         }
         let stay = self.not_applied.iter().filter(|cause| cause.reason != OF_THE_OUTPUT_ENCODER);
         stay.for_each(|of| text += &format!("; with {}, which no table has: it stays", of.cause.as_str()));
