@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::folds::Folds;
-use super::parts::{State, WIND_UP_DEGREE};
+use super::parts::{PartName, State, WIND_UP_DEGREE};
 use super::prior::Prior;
 use super::reading::DELAY;
 use super::rows::Rows;
@@ -141,11 +141,12 @@ impl CalibrationFile {
 }
 
 impl WindUpTorque {
-    /// None where the output does not give way to the load.
+    /// None where nothing winds up under the load: play alone does not say a torque.
     pub(super) fn of(rows: &Rows, folds: &Folds, model: &Model, prior: &Prior<'_>) -> Option<Self> {
         let [low, high] = model.scales.torque_n_m;
         let per_n_m = (model.under_arcsec(high, prior) - model.under_arcsec(low, prior)) / (high - low);
-        if per_n_m.is_nan() || per_n_m <= 0.0 {
+        let springs = prior.nominal.stiffness.iter().any(|[_, n_m_per_rad]| n_m_per_rad.is_finite());
+        if per_n_m.is_nan() || per_n_m <= 0.0 || !(springs || model.of(PartName::WindUp).is_some()) {
             return None;
         }
         let all = folds.all();
