@@ -969,7 +969,9 @@ impl Fitted {
                 let share = (without - with) / without;
                 let explain =
                     format!("{:.1} % of the remaining variance (threshold {:.0} %)", 100.0 * share, 100.0 * LEAST_GAIN);
-                let why = if chosen.is_some() {
+                let why = if chosen.is_some() && share <= 0.0 {
+                    "the parts chosen after it explain what it does: these rows do not tell them apart".to_owned()
+                } else if chosen.is_some() {
                     let times = (without / with).sqrt();
                     format!("explains {explain}; without it the held-out error is {times:.2} times as large")
                 } else if share > LEAST_GAIN {
