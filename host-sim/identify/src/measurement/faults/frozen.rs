@@ -125,7 +125,7 @@ fn missed(values: &[f64], stretch: &Range<usize>) -> f64 {
 const AT_LIMIT_ROWS: usize = 3;
 /// … and in this share of all rows at least. *Guess*: fewer may be left in.
 const AT_LIMIT_SHARE: f64 = 0.005;
-/// Noise below this share of the range of a torque is round-off. *Guess*: sensors are no better than 20 bits.
+/// Noise below this share of the range of a channel is round-off. *Guess*: sensors are no better than 20 bits.
 const ROUND_OFF: f64 = 1e-6;
 
 /// Leaves out rows in which the torque stands at its largest or its least value, though it has noise elsewhere: the
@@ -165,7 +165,8 @@ fn saturated(log: &Log, drop: &mut [bool], findings: &mut Findings) {
 fn of_channel(log: &mut Log, channel: Quantity, drop: &mut [bool], findings: &mut Findings) {
     let Some(mut values) = log.take(channel) else { return };
     let rows = log.len();
-    let has_noise = has_noise(log.pieces(&values), 0.0);
+    let (least, most) = least_and_most(values.iter().copied());
+    let has_noise = has_noise(log.pieces(&values), ROUND_OFF * (most - least));
     let standing = log.continued().filter(|row| values[*row] == values[row - 1]).count();
     let is_frozen = |stretch: &Range<usize>| {
         // Without this stretch the channel stands in this many of its steps.
