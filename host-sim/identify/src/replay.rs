@@ -51,7 +51,7 @@ pub struct ReplayedRow {
     pub predicted_arcsec: f64,
     /// Measured less predicted, arcsec.
     pub residual_arcsec: f64,
-    /// Uncertainty that the core states, arcsec.
+    /// Uncertainty, arcsec: what the core states of the flank, and the half width of the calibration, if there was one.
     pub uncertainty_arcsec: f64,
     /// Quality of the prediction.
     pub quality: &'static str,
@@ -362,7 +362,7 @@ pub fn replay(
                 measured_arcsec: row.error_arcsec,
                 predicted_arcsec: f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD,
                 residual_arcsec: *residual,
-                uncertainty_arcsec: f64::from(said.uncertainty_rad) * ARCSEC_PER_RAD,
+                uncertainty_arcsec: f64::from(said.uncertainty_rad) * ARCSEC_PER_RAD + calibrated.half_width_arcsec,
                 quality: QUALITIES[said.quality as usize],
                 torque_from_wind_up_n_m: torque[0],
                 torque_from_wind_up_low_n_m: torque[1],
