@@ -215,7 +215,7 @@ impl Folds {
     }
 }
 
-/// Products of the curve over the output in parts of its turn without rows, for each row there is: they count as if
+/// Products of the curve over the output in parts of its turn far from rows, for each row there is: they count as if
 /// zero had been recorded there, as often as rows were recorded elsewhere. Waves that are fitted to a part of the turn
 /// swing in the rest of it.
 fn unrecorded(parts: &[PartName], scales: &Scales, begins: &[usize]) -> Gram {

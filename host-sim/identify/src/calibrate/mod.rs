@@ -89,7 +89,7 @@ const BOTH_WAYS: f64 = 0.1;
 /// is smooth over a period of its highest wave… *Guess*.
 const MOST_OF_A_TURN: f64 = 0.75;
 const PERIOD_OF_THE_OUTPUT: f64 = 1.0 / parts::OUTPUT_ORDERS as f64;
-/// …and is held at zero in the rest of the turn where less than this was recorded.
+/// …and is held at zero in the rest of the turn, a period away from rows, where less than this was recorded.
 const HALF_A_TURN: f64 = 0.5;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;

@@ -132,8 +132,11 @@ impl Recorded {
             let (low, high) = least_and_most(loads);
             high - low < super::LEAST_FRICTION * most
         };
-        let unrecorded = without_rows(angles(1.0 / prior.nominal.ratio), PARTS_OF_A_TURN);
-        let output_share = share_with_rows(unrecorded, PARTS_OF_A_TURN);
+        let output = || angles(1.0 / prior.nominal.ratio);
+        let output_share = share_with_rows(without_rows(output(), PARTS_OF_A_TURN), PARTS_OF_A_TURN);
+        // Nearer to a row no wave can come to zero.
+        let near_rad = [-1.0, 0.0, 1.0].map(|periods| periods * super::PERIOD_OF_THE_OUTPUT * TAU);
+        let near = output().flat_map(|angle| near_rad.map(|near_rad| angle + near_rad));
         let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
             torque_noise_n_m,
@@ -144,7 +147,7 @@ impl Recorded {
                 teeth: prior.tooth_pitches(),
                 speed_rad_s: fast,
                 late_s: late_s(period_s),
-                unrecorded: if output_share < super::HALF_A_TURN { unrecorded } else { 0 },
+                unrecorded: if output_share < super::HALF_A_TURN { without_rows(near, PARTS_OF_A_TURN) } else { 0 },
             },
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             one_pace,
@@ -153,7 +156,7 @@ impl Recorded {
             has_temperature,
             generator_share: share_with_rows(without_rows(angles(1.0), 24), 24),
             output_share,
-            parts: parts_between(angles(1.0 / prior.nominal.ratio)),
+            parts: parts_between(output()),
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
             step_rad,
