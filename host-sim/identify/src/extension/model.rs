@@ -111,9 +111,6 @@ impl Model {
         // A relative change of the wind-up is the inverse one of the stiffness.
         nominal.stiffness.iter_mut().for_each(|[_, k]| *k /= (1.0 + change("stiffness")).max(0.05));
         nominal.backlash_arcsec *= (1.0 + change("backlash")).max(0.0);
-        // What any drive may have is known of this one now, and a file holds no larger share.
-        nominal.spread.stiffness = nominal.spread.stiffness.min(1.0);
-        nominal.spread.backlash = nominal.spread.backlash.min(1.0);
         if nominal.spread.harmonic > 0.0 {
             // In phase and in quadrature, one pair for each harmonic that has an amplitude.
             let changes = numbered(&diagnosis.recalibrated, "harmonic");
@@ -177,8 +174,9 @@ impl Model {
             n.backlash_arcsec,
             n.friction_torque_n_m,
             n.temperature_c,
-            s.stiffness,
-            s.backlash,
+            // What any drive may have is known of this one, and a file holds no larger share.
+            s.stiffness.min(1.0),
+            s.backlash.min(1.0),
             s.harmonic,
             causes_to_toml(&self.causes)
         )
@@ -316,8 +314,12 @@ mod tests {
 
     #[test]
     fn what_is_written_reads_back_the_same() {
-        let model = model();
-        assert_eq!(Model::from_toml("d.toml", &model.to_toml()).unwrap(), model);
+        let mut model = model();
+        model.nominal.spread.stiffness = 1.0;
+        let text = model.to_toml();
+        assert_eq!(Model::from_toml("d.toml", &text).unwrap(), model);
+        model.nominal.spread.stiffness = 40.0;
+        assert_eq!(model.to_toml(), text, "a spread that is as good as none");
         let effects: Vec<Effect> = model.causes.iter().filter_map(CauseEntry::effect).collect();
         assert_eq!(effects.len(), 2);
         assert_eq!(effects[0].given(Name::DelayS), Some(0.0021));
