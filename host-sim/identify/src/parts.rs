@@ -122,7 +122,7 @@ pub struct Scales {
     pub speed_rad_s: f64,
     /// Standard deviation of the delay between the two angles before anything says how large it is, s.
     pub late_s: f64,
-    /// Parts of the output's turn far from rows, of `PARTS_OF_A_TURN`, a bit each; none where half of it has rows.
+    /// Parts of the output's turn far from rows, of `PARTS_OF_A_TURN`, a bit each.
     pub unrecorded: u64,
 }
 

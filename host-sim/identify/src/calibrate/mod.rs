@@ -86,11 +86,9 @@ pub(crate) const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
 const BOTH_WAYS: f64 = 0.1;
 /// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output, whose curve
-/// is smooth over a period of its highest wave… *Guess*.
+/// is smooth over a period of its highest wave, and zero farther from all rows. *Guess*.
 const MOST_OF_A_TURN: f64 = 0.75;
 const PERIOD_OF_THE_OUTPUT: f64 = 1.0 / parts::OUTPUT_ORDERS as f64;
-/// …and is held at zero in the rest of the turn, a period away from rows, where less than this was recorded.
-const HALF_A_TURN: f64 = 0.5;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;
 /// Rows that the usual half width is taken of.
@@ -495,15 +493,15 @@ fn calibrated<T>(
     known: &Prior<'_>,
     say: impl FnOnce(FitOfLogs<'_>) -> Result<T, CalibrationError>,
 ) -> Result<T, CalibrationError> {
-    let (files, prior) = (given, known);
-    if let Some([one, other]) = given_twice(files) {
+    let prior = known;
+    if let Some([one, other]) = given_twice(given) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
     prior.core_drive()?;
-    let by_a_load_rad = if files.len() > 1 { LEAST_OF_OTHER_RATIO_RAD } else { 0.0 };
-    let said = files.iter().map(|file| check_ratio_of(file, prior.nominal.ratio, by_a_load_rad));
+    let by_a_load_rad = if given.len() > 1 { LEAST_OF_OTHER_RATIO_RAD } else { 0.0 };
+    let said = given.iter().map(|file| check_ratio_of(file, prior.nominal.ratio, by_a_load_rad));
     let mut said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-    let mut files = in_pieces(files);
+    let mut files = in_pieces(given);
     if let Some(anew) = set_anew(&files, prior) {
         // Sessions before a lost index and behind it have other zeros, too: without it they have one.
         let recorded = Recorded::of(&files, prior);
@@ -729,8 +727,7 @@ fn report(fit: FitOfLogs<'_>, split: bool) -> Result<Calibrated, CalibrationErro
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
     let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
-    let none = || vec![0.0; files.len()];
-    let of_columns = delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
+    let of_columns = delays.as_ref().map_or(vec![0.0; files.len()], |delays| delays.of_columns(&recorded.scales));
     let left_out_arcsec = held_out.rms_after_arcsec;
     let correlation = rows.load_with_output_angle();
     let beside = collinear(&rows, &model, correlation);

@@ -69,8 +69,6 @@ pub(super) struct Recorded {
     pub backward_share: f64,
     /// Noise of the torque from row to row, N·m.
     pub torque_noise_n_m: f64,
-    /// Usual step of the generator, rad.
-    pub step_rad: f64,
     /// Generator turns in steps that are short beside a tooth pitch.
     pub fine_turns: f64,
     pub temperature_c: f64,
@@ -101,9 +99,6 @@ impl Recorded {
         let generator = least_and_most(angles(1.0));
         let steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| p[1] - p[0]));
         let steps: Vec<f64> = steps.map(|step| step * prior.nominal.ratio.signum()).collect();
-        let mut sizes = sampled(&steps);
-        sizes.iter_mut().for_each(|step| *step = step.abs());
-        let step_rad = quantile_of(&mut sizes, 0.9);
         // By the way and not by rows: one direction may be driven at another pace.
         let way = |of: &dyn Fn(&f64) -> bool| steps.iter().filter(|step| of(step)).map(|step| step.abs()).sum::<f64>();
         let (moved, backward) = (way(&|_| true), way(&|step| *step < 0.0));
@@ -123,10 +118,9 @@ impl Recorded {
         // What a delay does by the pace, play does by the direction: each has to be driven at several, or one.
         let several = |[slow, fast]: [f64; 2]| fast > 0.0 && fast >= super::OTHER_PACE * slow;
         let one_pace = ![paces(&|speed| speed), paces(&|speed| -speed)].into_iter().any(several);
-        let mut periods: Vec<f64> =
+        let periods: Vec<f64> =
             sessions().filter_map(|s| s.time_s.as_ref()).flat_map(|t| t.windows(2).map(|p| p[1] - p[0])).collect();
-        periods = sampled(&periods);
-        let period_s = quantile_of(&mut periods, 0.5);
+        let period_s = quantile_of(&mut sampled(&periods), 0.5);
         let keeps_to_one_load = |file: &Recording| {
             let loads = file.sessions.iter().flat_map(|session| session.torque_n_m.iter().flatten().copied());
             let (low, high) = least_and_most(loads);
@@ -135,8 +129,7 @@ impl Recorded {
         let output = || angles(1.0 / prior.nominal.ratio);
         let output_share = share_with_rows(without_rows(output(), PARTS_OF_A_TURN), PARTS_OF_A_TURN);
         // Nearer to a row no wave can come to zero.
-        let near_rad = [-1.0, 0.0, 1.0].map(|periods| periods * super::PERIOD_OF_THE_OUTPUT * TAU);
-        let near = output().flat_map(|angle| near_rad.map(|near_rad| angle + near_rad));
+        let near = output().flat_map(|of| [-1.0, 0.0, 1.0].map(|k| of + k * super::PERIOD_OF_THE_OUTPUT * TAU));
         let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
             torque_noise_n_m,
@@ -147,7 +140,7 @@ impl Recorded {
                 teeth: prior.tooth_pitches(),
                 speed_rad_s: fast,
                 late_s: late_s(period_s),
-                unrecorded: if output_share < super::HALF_A_TURN { without_rows(near, PARTS_OF_A_TURN) } else { 0 },
+                unrecorded: without_rows(near, PARTS_OF_A_TURN),
             },
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             one_pace,
@@ -159,7 +152,6 @@ impl Recorded {
             parts: parts_between(output()),
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
-            step_rad,
             fine_turns,
             temperature_c: if has_temperature { f64::midpoint(temperature.0, temperature.1) } else { usual },
         }
@@ -206,7 +198,8 @@ impl Recorded {
                 Some("the teeth are not known, the ratio alone is".to_owned())
             }
             PartName::ToothPitch if self.fine_turns < super::FINE_TURNS => {
-                Some(format!("rows are {:.2} tooth pitches apart", self.step_rad * self.scales.teeth / TAU))
+                let rows = super::ROWS_OF_A_PITCH;
+                Some(format!("{:.2} generator turns have {rows} rows to a tooth pitch", self.fine_turns))
             }
             PartName::OutputAngle if self.output_share < super::PERIOD_OF_THE_OUTPUT => {
                 Some(format!("{:.0} % of an output turn was recorded", 100.0 * self.output_share))

@@ -248,11 +248,7 @@ impl LogPair<'_> {
         let left_by_output = if by_output.abs() > step { left(&by_output) } else { f64::INFINITY };
         let absolute = gains(left_by_output, 1.0 - LEAST_GAIN);
         let by_waves = || self.by_waves().filter(|zero| gains(left(zero), TURNED_BACK));
-        let found = match absolute {
-            true => Some(by_output),
-            false if may_gain(TURNED_BACK) => by_waves(),
-            false => None,
-        };
+        let found = absolute.then_some(by_output).or_else(|| may_gain(TURNED_BACK).then(by_waves).flatten());
         let found = found.and_then(|zero| self.search(FOUND_WITH, |search| search.close_to(zero, step)));
         // As it stands is what nobody would turn: it is told where turning it leaves more.
         let untold = elsewhere && may_gain(TURNED_BACK) && left_by_output < squares(&stands);
