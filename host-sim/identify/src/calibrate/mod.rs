@@ -493,54 +493,53 @@ fn calibrated<T>(
     known: &Prior<'_>,
     say: impl FnOnce(FitOfLogs<'_>) -> Result<T, CalibrationError>,
 ) -> Result<T, CalibrationError> {
-    let prior = known;
     if let Some([one, other]) = given_twice(given) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
-    prior.core_drive()?;
+    known.core_drive()?;
     let by_a_load_rad = if given.len() > 1 { LEAST_OF_OTHER_RATIO_RAD } else { 0.0 };
-    let said = given.iter().map(|file| check_ratio_of(file, prior.nominal.ratio, by_a_load_rad));
+    let said = given.iter().map(|file| check_ratio_of(file, known.nominal.ratio, by_a_load_rad));
     let mut said: Vec<String> = said.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     let mut files = in_pieces(given);
-    if let Some(anew) = set_anew(&files, prior) {
+    if let Some(anew) = set_anew(&files, known) {
         // Sessions before a lost index and behind it have other zeros, too: without it they have one.
-        let recorded = Recorded::of(&files, prior);
-        let rows = settled(&files, prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
-        let plain = fit(rows, prior, &recorded, &[]);
-        let parted = at_lost_index(given, &files, &plain, prior);
-        if let Some(parted) = parted.filter(|parted| set_anew(&in_pieces(parted), prior).is_none()) {
+        let recorded = Recorded::of(&files, known);
+        let rows = settled(&files, known, &recorded).sure(recorded.scales.friction_n_m, &recorded);
+        let plain = fit(rows, known, &recorded, &[]);
+        let parted = at_lost_index(given, &files, &plain, known);
+        if let Some(parted) = parted.filter(|parted| set_anew(&in_pieces(parted), known).is_none()) {
             return calibrated(&parted, known, say);
         }
         files = anew;
         said.push(SET_ANEW.to_owned());
     }
-    let mut recorded = Recorded::of(&files, prior);
-    let mut rows = settled(&files, prior, &recorded);
+    let mut recorded = Recorded::of(&files, known);
+    let mut rows = settled(&files, known, &recorded);
     let mut zeros = Vec::new();
-    if let Some(starts) = Starts::of(&rows, &recorded, prior, &files) {
+    if let Some(starts) = Starts::of(&rows, &recorded, known, &files) {
         zeros = starts.readings(&files);
         said.extend(starts.notes(&files));
-        files = starts.on_one(files, prior.nominal.ratio);
-        recorded = Recorded::of(&files, prior);
-        rows = settled(&files, prior, &recorded);
+        files = starts.on_one(files, known.nominal.ratio);
+        recorded = Recorded::of(&files, known);
+        rows = settled(&files, known, &recorded);
     }
-    let delays = Delays::of(rows.clone(), prior, &recorded);
+    let delays = Delays::of(rows.clone(), known, &recorded);
     if let Some(delays) = &delays {
-        delays.take_out(&mut files, prior.nominal.ratio);
-        rows = settled(&files, prior, &recorded);
+        delays.take_out(&mut files, known.nominal.ratio);
+        rows = settled(&files, known, &recorded);
     }
-    recorded.scales.friction_n_m = match prior.table {
-        Some(table) => dead_zone(&rows, prior, table, &recorded),
-        None => friction_of(&rows, prior, &recorded),
+    recorded.scales.friction_n_m = match known.table {
+        Some(table) => dead_zone(&rows, known, table, &recorded),
+        None => friction_of(&rows, known, &recorded),
     };
     rows = rows.sure(recorded.scales.friction_n_m, &recorded);
-    let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
+    let pace = play_of_a_millisecond(&rows.rows, &recorded, known).map(note_of_one_pace);
     let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
     let friction_n_m = recorded.scales.friction_n_m;
-    let alignment = prior.table.map(|table| zero::align(table, &rows, friction_n_m));
+    let alignment = known.table.map(|table| zero::align(table, &rows, friction_n_m));
     let told = alignment.as_ref().filter(|found| found.told);
     let zero_rad = told.map_or(0.0, |found| found.generator_zero_deg.to_radians());
-    let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..prior.clone() };
+    let prior = &Prior { least_friction_n_m: friction_n_m, zero_rad, ..known.clone() };
     let (files, recorded) = (&files, &recorded);
     let fitted = fit(rows.clone().less(prior), prior, recorded, &[]);
     if let Some(parted) = at_lost_index(given, files, &fitted, prior) {

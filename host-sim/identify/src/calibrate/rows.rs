@@ -28,6 +28,8 @@ const BEYOND_OTHERS: f64 = 0.1;
 const ENOUGH_FILES: usize = 3;
 /// Rows that are fitted, at most; of longer records every n-th.
 pub(super) const MOST_ROWS: usize = 40_000;
+/// A reversal is one if the generator goes back by this share of its usual step.
+const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by this multiple of the play.
 const SETTLED: f64 = 1.5;
 
@@ -69,6 +71,8 @@ pub(super) struct Recorded {
     pub backward_share: f64,
     /// Noise of the torque from row to row, N·m.
     pub torque_noise_n_m: f64,
+    /// Usual step of the generator, rad.
+    pub step_rad: f64,
     /// Generator turns in steps that are short beside a tooth pitch.
     pub fine_turns: f64,
     pub temperature_c: f64,
@@ -99,17 +103,15 @@ impl Recorded {
         let generator = least_and_most(angles(1.0));
         let steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| p[1] - p[0]));
         let steps: Vec<f64> = steps.map(|step| step * prior.nominal.ratio.signum()).collect();
+        let step_rad = quantile_of(&mut sampled(&steps.iter().map(|step| step.abs()).collect::<Vec<f64>>()), 0.9);
         // By the way and not by rows: one direction may be driven at another pace.
         let way = |of: &dyn Fn(&f64) -> bool| steps.iter().filter(|step| of(step)).map(|step| step.abs()).sum::<f64>();
         let (moved, backward) = (way(&|_| true), way(&|step| *step < 0.0));
         let fine_rad = TAU / (super::ROWS_OF_A_PITCH * prior.tooth_pitches());
         let fine_turns = way(&|step| step.abs() <= fine_rad * (1.0 + 1e-3)) / TAU;
         let most = torque.0.abs().max(torque.1.abs());
-        let speeds: Vec<f64> = sessions()
-            .flat_map(|session| speeds_rad_s(session, prior.nominal.ratio))
-            .filter(|s| s.abs() > 0.0)
-            .collect();
-        let speeds = sampled(&speeds);
+        let speeds = sessions().flat_map(|session| speeds_rad_s(session, prior.nominal.ratio));
+        let speeds = sampled(&speeds.filter(|speed| speed.abs() > 0.0).collect::<Vec<f64>>());
         let paces = |of: &dyn Fn(f64) -> f64| {
             let mut some: Vec<f64> = speeds.iter().map(|speed| of(*speed)).filter(|pace| *pace > 0.0).collect();
             [0.1, 0.9].map(|share| quantile_of(&mut some, share))
@@ -152,6 +154,7 @@ impl Recorded {
             parts: parts_between(output()),
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
+            step_rad,
             fine_turns,
             temperature_c: if has_temperature { f64::midpoint(temperature.0, temperature.1) } else { usual },
         }
@@ -198,8 +201,7 @@ impl Recorded {
                 Some("the teeth are not known, the ratio alone is".to_owned())
             }
             PartName::ToothPitch if self.fine_turns < super::FINE_TURNS => {
-                let rows = super::ROWS_OF_A_PITCH;
-                Some(format!("{:.2} generator turns have {rows} rows to a tooth pitch", self.fine_turns))
+                Some(format!("rows are {:.2} tooth pitches apart", self.step_rad * self.scales.teeth / TAU))
             }
             PartName::OutputAngle if self.output_share < super::PERIOD_OF_THE_OUTPUT => {
                 Some(format!("{:.0} % of an output turn was recorded", 100.0 * self.output_share))
@@ -273,7 +275,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
         let begin = all.rows.len();
         for (session, number) in file.sessions.iter().zip(sessions.by_ref()) {
             let settle_rad = SETTLED * play_rad * prior.nominal.ratio.abs();
-            let mut ways = directions(session, prior.nominal.ratio, settle_rad);
+            let mut ways = directions(session, prior.nominal.ratio, recorded.step_rad, settle_rad);
             held_by_load(&mut ways, session, recorded.scales.friction_n_m, settle_rad);
             let speeds = speeds_rad_s(session, prior.nominal.ratio);
             let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
@@ -431,9 +433,9 @@ impl Rows {
 
 /// Direction of the output in each row; `None` before the first motion, where it begins to turn back, and until the
 /// play is through after a reversal.
-fn directions(session: &Session, ratio: f64, settle_rad: f64) -> Vec<Option<f64>> {
+fn directions(session: &Session, ratio: f64, step_rad: f64, settle_rad: f64) -> Vec<Option<f64>> {
     let angle = &session.generator_rad;
-    let turns = turns(angle, TURNED_BACK_RAD);
+    let turns = turns(angle, TURNED_ROUND * step_rad);
     let settled = |(psi, (way, turned_at)): (&f64, &(f64, f64))| {
         (*way != 0.0 && (psi - turned_at).abs() >= settle_rad).then_some(way * ratio.signum())
     };
@@ -468,14 +470,14 @@ mod tests {
         psi.extend((1..=20).map(f64::from));
         psi.extend((0..15).map(|k| 19.0 - f64::from(k)));
         let session = Session { generator_rad: psi, error_rad: vec![0.0; 40], ..Session::default() };
-        let ways = directions(&session, 100.0, 3.0);
+        let ways = directions(&session, 100.0, 1.0, 3.0);
         assert_eq!(ways[..7], [None; 7]);
         assert_eq!((ways[7], ways[24], ways[25], ways[26], ways[27]), (Some(1.0), Some(1.0), None, None, Some(-1.0)));
         // An output that turns against the generator.
-        assert_eq!(directions(&session, -100.0, 3.0)[24], Some(-1.0));
+        assert_eq!(directions(&session, -100.0, 1.0, 3.0)[24], Some(-1.0));
         // Rows that have turned back by less than what says so.
         let session = Session { generator_rad: vec![0.0, 0.5, 1.0, 1.0, 0.995, 0.985, 0.9], ..Session::default() };
         let there = Some(1.0);
-        assert_eq!(directions(&session, 100.0, 0.0), [None, there, there, there, None, None, Some(-1.0)]);
+        assert_eq!(directions(&session, 100.0, 0.04, 0.0), [None, there, there, there, None, None, Some(-1.0)]);
     }
 }
