@@ -653,9 +653,8 @@ impl<'a> RunState<'a> {
             .touches
             .map(|touches| if torque_n_m.unwrap_or(0.0) > 0.0 { touches.forward } else { touches.backward });
         let (peak, peak_step) = self.peak.expect("every path has a row");
-        let uneven =
-            rows.iter().map(|row| row.face).reduce(|a, b| if b.peak_over_mean > a.peak_over_mean { b } else { a });
-        let uneven = uneven.unwrap_or(Face::EVEN);
+        let more = |a: Face, b: Face| if b.peak_over_mean > a.peak_over_mean { b } else { a };
+        let uneven = rows.iter().map(|row| row.face).reduce(more).unwrap_or_default();
         let peak_flank_pressure_mpa = largest(rows, |row| row.peak_flank_pressure_mpa);
         let tip_contact = TipContact::worst(rows.iter().filter_map(|row| row.tips));
         let looked = LookedAt {

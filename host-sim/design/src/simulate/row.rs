@@ -6,7 +6,7 @@ use super::zones::TipContact;
 use flexspline_mechanics::stepping::Face;
 
 /// The drive after an increment; the fields are the columns of `results.csv`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Row {
     /// Place in the path.
     pub step: usize,

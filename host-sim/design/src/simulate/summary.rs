@@ -488,22 +488,11 @@ mod tests {
                     output_rad: output,
                     error_arcsec: (output - nominal) * ARCSEC_PER_RAD,
                     torque_n_m: torque,
-                    flank_contacts: 0,
-                    generator_contacts: 0,
-                    max_von_mises_mpa: 0.0,
-                    iterations: 1,
                     temperature_c: 20.0,
                     generator_torque_n_m: -torque / RATIO,
-                    drag_torque_n_m: 0.0,
-                    torque_balance_n_m: 0.0,
-                    peak_flank_pressure_mpa: 0.0,
-                    peak_generator_pressure_mpa: 0.0,
-                    residual: 0.0,
-                    face: flexspline_mechanics::stepping::Face::EVEN,
-                    lobe_force_n: 0.0,
-                    tips: None,
                     settled: travel.settled(0.0),
                     turn_rad: generator - from,
+                    ..Row::default()
                 });
             }
             rows

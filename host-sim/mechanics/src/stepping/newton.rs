@@ -105,9 +105,11 @@ pub struct Face {
     pub share: f64,
 }
 
-impl Face {
+impl Default for Face {
     /// Straight teeth, evenly loaded.
-    pub const EVEN: Face = Face { tilt_rad: 0.0, skew_rad: 0.0, peak_over_mean: 1.0, share: 1.0 };
+    fn default() -> Face {
+        Face { tilt_rad: 0.0, skew_rad: 0.0, peak_over_mean: 1.0, share: 1.0 }
+    }
 }
 
 /// Where the drive stands, and how it was found.

@@ -255,29 +255,7 @@ mod tests {
     use super::*;
 
     fn row(generator_rad: f64, error_arcsec: f64) -> Row {
-        Row {
-            step: 0,
-            generator_rad,
-            output_rad: 0.0,
-            error_arcsec,
-            torque_n_m: 0.0,
-            flank_contacts: 0,
-            generator_contacts: 0,
-            max_von_mises_mpa: 0.0,
-            iterations: 1,
-            temperature_c: 20.0,
-            generator_torque_n_m: 0.0,
-            drag_torque_n_m: 0.0,
-            torque_balance_n_m: 0.0,
-            peak_flank_pressure_mpa: 0.0,
-            peak_generator_pressure_mpa: 0.0,
-            residual: 0.0,
-            face: flexspline_mechanics::stepping::Face::EVEN,
-            lobe_force_n: 0.0,
-            tips: None,
-            settled: true,
-            turn_rad: 0.0,
-        }
+        Row { generator_rad, error_arcsec, settled: true, ..Row::default() }
     }
 
     const PITCH: f64 = TAU / 188.0;
