@@ -284,12 +284,13 @@ impl<'p> Solver<'p> {
         let Sought { generator_rad, torque_n_m, stage, .. } = sought;
         let settings = &self.problem.settings;
         let mut convergence = Convergence::new(stage.tolerance(settings), stage.most_iterations(settings));
+        let floats = torque_n_m == 0.0 && self.problem.drag == 0.0;
         self.iterate(sought, guess, &mut convergence, work).map_err(|reason| SolveError::NotConverged {
             generator_rad,
             torque_n_m,
             reached_n_m: torque_n_m,
             softened_to: None,
-            reason,
+            reason: if floats { FLOATS } else { reason },
             history: convergence.history,
         })
     }
@@ -354,8 +355,7 @@ impl<'p> Solver<'p> {
                 None => residual = self.assemble(&mut state, sought, &mut near),
             }
         }
-        let floats = torque_n_m == 0.0 && self.problem.drag == 0.0;
-        Err(if floats { FLOATS } else { "the iterations ran out" })
+        Err("the iterations ran out")
     }
 
     /// Goes along a step as far as forces do not turn round; what is out of balance there, or nothing where the step
