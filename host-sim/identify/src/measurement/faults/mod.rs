@@ -39,7 +39,6 @@ pub(super) mod outliers;
 pub(super) mod reads;
 pub(super) mod resolution;
 pub(super) mod stalls;
-mod state;
 pub(super) mod units;
 
 use std::ops::Range;

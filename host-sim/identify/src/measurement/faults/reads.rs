@@ -2,7 +2,8 @@
 //!
 //! Between two readings the drive moves on: an instant that is off by τ puts the error off by τ times the speed. Where
 //! τ scatters, the scatter of neighbouring rows grows with the speed, its square by (τ · speed)²; at rest nothing
-//! shows. Some loggers read single rows late, by far more than the others and always to the same side.
+//! shows. Waves of the drive scatter, too, where fast rows are too far apart to follow them, but by no such law. Some
+//! loggers read single rows late, by far more than the others and always to the same side.
 //!
 //! The scatter of a row is its residual when a cubic goes through the rows around it. Rows then weigh what
 //! noise and scatter together leave of them; rows that were read late are left out.
@@ -11,12 +12,11 @@
 //! off by is in the error, over the ratio, with the sign turned, at any pace. An output that follows a generator which
 //! really moves so has no such error.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use super::outliers::repeat_with_position;
 use super::resolution::seen;
-use super::{ARCSEC, Findings, farthest, marked, state};
+use super::{ARCSEC, Findings, farthest, marked};
 use crate::least_squares::Normal;
 use crate::measurement::columns::Quantity;
 use crate::measurement::cubic_at_zero;
@@ -57,9 +57,11 @@ const ONE_SIDED: f64 = 0.8;
 const IN_MOTION: f64 = 0.3;
 /// Late rows that cannot be distinguished from others are up to this many times those that can. *Guess*.
 const UNSEEN: f64 = 2.0;
-/// Readings that scatter independently: neighbouring values of the scatter of a row correlate by −56/70, within this. A
-/// swing has more or less. *Guess* for the width; −56/70 is derived from the weights 1, −4, 6, −4, 1.
-const WHITE: f64 = 0.08;
+/// The line fits within this χ² a class: waves of the drive miss it. *Source*: the mean of χ² is the degrees of freedom.
+const MISFIT: f64 = 1.0;
+/// The drive moves evenly where the scatter of the generator's angle is below this share of what it turns by in a fast
+/// row. *Guess*: between rows from stop to stop it is 0.7 and more.
+const EVEN: f64 = 0.5;
 /// Scatter of the error against that of the generator's angle over the ratio is −1 within this, where it is that angle
 /// that is misread: what other noise of the angle and motion that is real leave of it. *Guess*.
 const MISREAD: f64 = 0.15;
@@ -85,7 +87,7 @@ type Late = (usize, f64);
 /// Rows as they were read.
 struct Reads<'a> {
     log: &'a Log,
-    error: Cow<'a, [f64]>,
+    error: &'a [f64],
     /// The generator's angle over the ratio, rad.
     turned: Vec<f64>,
     /// Change of the output from row to row, rad.
@@ -102,7 +104,7 @@ impl<'a> Reads<'a> {
         };
         let speed = |(a, b): (usize, usize)| (turned[b] - turned[a]) / (b - a).max(1) as f64;
         let speed = log.sessions().flat_map(of_session).map(speed).collect();
-        Reads { log, error: Cow::Borrowed(log.of(Quantity::Error)), speed, good: (0..log.len()).collect(), turned }
+        Reads { log, error: log.of(Quantity::Error), speed, good: (0..log.len()).collect(), turned }
     }
 
     /// By how far a good row is off the cubic through the two good rows before and after it, rad; 0 near the ends.
@@ -184,7 +186,7 @@ impl Jitter {
 
     /// By scatter that grows with the speed.
     fn by_speed(reads: &Reads<'_>, fast: f64) -> Option<Jitter> {
-        let classes = classes(reads, |off| MAD_TO_STD * median_of(off));
+        let classes = classes(reads, fast, |off| MAD_TO_STD * median_of(off));
         let floor = classes.iter().map(|class| class.variance).fold(f64::INFINITY, f64::min).max(1e-30);
         // Neighbouring scatters share rows: a class is worth about a third of its rows. A median deviation is known to
         // 1.17 / sqrt(n).
@@ -203,14 +205,16 @@ impl Jitter {
         let [at_rest, at_speed] = [0, 1].map(|k| both.values()[k].sqrt());
         let jitter = Jitter { noise: at_rest, rows: at_speed / fast };
         let certain = at_rest >= 0.0 && noise.misfit() - both.misfit() > CERTAIN;
-        (certain && jitter.matters(fast) && is_white(reads, fast)).then_some(jitter)
+        let fits = both.misfit() <= MISFIT * classes.len() as f64;
+        (certain && fits && jitter.matters(fast)).then_some(jitter)
     }
 }
 
 /// Scatter by speed, of classes with equally many rows. `spread` makes a standard deviation of absolute values, which
-/// it may overwrite.
-fn classes(reads: &Reads<'_>, spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class> {
-    let mut rows: Vec<(f64, f64)> = reads.scatter().map(|(off, _, row)| (reads.speed[row].abs(), off.abs())).collect();
+/// it may overwrite. Between rows from stop to stop there is no speed.
+fn classes(reads: &Reads<'_>, fast: f64, spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class> {
+    let even = reads.scatter().filter(|(_, turned, _)| turned.abs() < EVEN * fast);
+    let mut rows: Vec<(f64, f64)> = even.map(|(off, _, row)| (reads.speed[row].abs(), off.abs())).collect();
     rows.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let of = |class: &[(f64, f64)]| {
         let (mut off, rows): (Vec<f64>, f64) = (class.iter().map(|(_, off)| *off).collect(), class.len() as f64);
@@ -241,20 +245,11 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         log.loudness = Some(vec![1.0; rows]);
         return;
     }
-    let (mut late, mut by_speed) = (Vec::new(), None);
-    for without_state in [false, true] {
-        // Waves of the drive that fast rows are too far apart to follow scatter as well: what shows has to show without
-        // what its state explains, too.
-        if without_state {
-            let Some(left) = state::left(log, gear) else { break };
-            reads.error = Cow::Owned(left);
-        }
-        late = late_rows(&mut reads, fast, gear);
-        by_speed = Jitter::by_speed(&reads, fast)
-            .filter(|jitter| misread.is_none() && !is_of_counts(log, gear, Quantity::Output, jitter.rows * fast));
-        if late.is_empty() && misread.is_none() && by_speed.is_none() {
-            return;
-        }
+    let late = late_rows(&mut reads, fast, gear);
+    let by_speed = Jitter::by_speed(&reads, fast)
+        .filter(|jitter| misread.is_none() && !is_of_counts(log, gear, Quantity::Output, jitter.rows * fast));
+    if late.is_empty() && misread.is_none() && by_speed.is_none() {
+        return;
     }
     let jitter = misread.map(|(jitter, _)| jitter).or(by_speed);
     // Rows that are late by less than can be detected stay: as many again, and as late, on the mean.
@@ -308,21 +303,6 @@ fn is_of_counts(log: &Log, gear: &Gear, channel: Quantity, off: f64) -> bool {
     seen(log, gear).into_iter().any(|(of, step)| is_it(of) && off < 0.5 * step)
 }
 
-/// Whether the scatter of rows in motion is that of readings which know nothing of each other.
-fn is_white(reads: &Reads<'_>, fast: f64) -> bool {
-    let off: Vec<(f64, f64, usize)> = reads.scatter().filter(|row| reads.speed[row.2].abs() > 0.5 * fast).collect();
-    let next = |pair: &[(f64, f64, usize)]| {
-        let follows = pair[1].2 == pair[0].2 + 1 && reads.log.continues(pair[1].2);
-        follows.then(|| [pair[0].0, pair[1].0])
-    };
-    let pairs = || off.windows(2).filter_map(next);
-    let spread = MAD_TO_STD * median_of(&mut pairs().map(|[off, _]| off.abs()).collect::<Vec<f64>>());
-    let cut = |off: f64| off.clamp(-4.0 * spread, 4.0 * spread);
-    let (own, common) = pairs()
-        .fold((0.0, 0.0), |sum, [a, b]| (sum.0 + 0.5 * (cut(a).powi(2) + cut(b).powi(2)), sum.1 + cut(a) * cut(b)));
-    (common / f64::max(own, 1e-300) + 56.0 / 70.0).abs() < WHITE
-}
-
 /// Scatter of a row of this speed, rad.
 fn expected(known: &[Class], speed: f64) -> f64 {
     let off = |class: &&Class| (class.speed - speed.abs()).abs();
@@ -336,7 +316,7 @@ fn late_rows(reads: &mut Reads<'_>, fast: f64, gear: &Gear) -> Vec<Late> {
     reads.good = (0..reads.speed.len()).collect();
     let mut late: Vec<Late> = Vec::new();
     for _ in 0..LATE_PASSES {
-        let known = classes(reads, |off| quantile_of(off, LOW.0) / LOW.1);
+        let known = classes(reads, fast, |off| quantile_of(off, LOW.0) / LOW.1);
         let more = reads.take_late(&known);
         // Most logs end here.
         let few = more.len() < LATE_ROWS;
