@@ -292,8 +292,8 @@ pub(crate) fn parse_at_least(
     faults::held::check(&mut log, gear, &mut findings);
     faults::frozen::check(&mut log, gear, &mut findings).map_err(refuse)?;
     faults::held::check_coarse_torque(&mut log, &mut findings);
-    faults::reads::check(&mut log, gear, &mut findings);
     faults::outliers::check(&mut log, gear, &mut findings);
+    faults::reads::check(&mut log, gear, &mut findings);
     faults::resolution::check(&mut log, gear, &mut findings);
     let mut sessions = log.into_sessions();
     sessions.iter_mut().for_each(|session| load_without_noise(session, gear.ratio));

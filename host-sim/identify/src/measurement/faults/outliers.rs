@@ -1,14 +1,17 @@
-//! Single rows that neither the rows before nor those after bear out.
+//! Single rows that neither the rows before nor those after bear out. Where most of many are off to one side of the
+//! motion, they were read late.
 
 use std::ops::Range;
 
+use super::reads::period_s;
 use super::resolution::seen;
 use super::{ARCSEC, Findings, HELD, farthest, largest_torque, level, marked};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::cubic_at_zero;
+use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
-use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled, white_noise};
+use flexspline_base::robust::{MAD_TO_STD, least_and_most, median_of, quantile_of, sampled, white_noise};
 
 /// A row is out by this number of standard deviations of the white noise… *Guess*, raised from 8 for fewer false
 /// alarms.
@@ -145,7 +148,7 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
 
 /// Outliers of the error: left out, and named where they are the data's and not the drive's.
 fn of_error(log: &mut Log, gear: &Gear, findings: &mut Findings) {
-    let noise = white_noise(log.pieces(log.of(Quantity::Error)));
+    let (rows, noise) = (log.len(), white_noise(log.pieces(log.of(Quantity::Error))));
     let resolution = seen(log, gear).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
     let largest_n_m = largest_torque(log);
@@ -182,46 +185,79 @@ fn of_error(log: &mut Log, gear: &Gear, findings: &mut Findings) {
         findings.notes.push(format!("{number} single rows stand out{why}"));
         found.clear();
     }
+    let late_by = late_by(generator, &found);
     report(log, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
     let many = are_many(&found, log);
     log.leave_out(&marked(log.len(), moved.into_iter().chain(found).map(|(row, _)| row)));
     if many {
-        let tail = (TAIL * noise).max(STEPS * resolution);
-        let more: usize = (0..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(log, tail)).sum();
+        let more: usize = (0..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(log, STEPS * resolution)).sum();
         if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
             fault.rows += more as u64;
+            if let Some(late_by) = late_by {
+                name_late(fault, fault.rows as f64 / rows as f64);
+                // Rows that are late by less than can be detected stay: as many again, and as late, on the mean.
+                let share = UNSEEN * fault.rows as f64 / rows as f64;
+                log.unsure_s = share * late_by * gear.ratio.abs() * period_s(log).unwrap_or(1.0);
+            }
         }
     }
 }
 
-/// Rows before and after of which the medians confirm a row where many are out. *Source*: derived, of five two may be
-/// out as well.
-const WIDELY_AROUND: usize = 5;
+/// Names rows that are out, a `share` of all, by what they are: read late.
+fn name_late(fault: &mut Fault, share: f64) {
+    let (rows, largest) = (fault.rows, fault.size_arcsec.unwrap_or_default().abs());
+    (fault.name, fault.channel, fault.size_arcsec) = (FaultName::ReadJitter, None, Some(largest));
+    fault.advice = FaultName::ReadJitter.advice();
+    fault.measures.late_rows = Some(rows);
+    fault.what = format!(
+        "the two angles are not read at one instant: {rows} rows ({:.1} %) are read late, by up to {largest:.0} arcsec: \
+         they are left out",
+        100.0 * share
+    );
+}
+
+/// Rows that are out were read late if they are this number at least… *Guess*: enough to see that they are off to one
+/// side.
+const LATE_ROWS: usize = 30;
+/// …of which this share is off to the same side, seen in the direction of motion. *Guess*: thirty rows at random are so
+/// in one case of seven hundred.
+const ONE_SIDED: f64 = 0.8;
+
+/// Late rows that cannot be distinguished from others are up to this many times those that can. *Guess*.
+const UNSEEN: f64 = 2.0;
+
+/// By how much, over the generator's travel from row to row, rows are out that were read late: those are off to one
+/// side of the motion.
+fn late_by(generator: &[f64], found: &[Out]) -> Option<f64> {
+    let by_travel = |(row, by): &Out| 2.0 * by / (generator[row + 1] - generator[row - 1]);
+    let mut late: Vec<f64> = found.iter().map(by_travel).collect();
+    let ahead = late.iter().filter(|by| **by > 0.0).count();
+    let most = ahead.max(late.len() - ahead);
+    let are_late = late.len() >= LATE_ROWS && most as f64 >= ONE_SIDED * late.len() as f64;
+    are_late.then(|| median_of(&mut late).abs())
+}
+
 /// Where many rows are far out, others are out by less: the tail of the same fault, mostly to one side, which would
-/// move means. What is off by more than this number of standard deviations of the white noise is left out as well, of
-/// sound rows one in thousands. *Source*: Hampel's identifier rejects from 3 on (Davies and Gather 1993); medians of
-/// five rows have a noise of their own.
+/// move means. What is off by more than this number of standard deviations is left out as well, of sound rows one in
+/// thousands. *Source*: Hampel's identifier rejects from 3 on (Davies and Gather 1993); the noise of one log is not
+/// everywhere the same.
 const TAIL: f64 = 4.0;
 /// Rounds of that search, as rows that are out hide others. *Guess*: each finds far fewer than the one before.
-const TAIL_ROUNDS: usize = 3;
+const TAIL_ROUNDS: usize = 5;
 
-/// Where many rows are out, those are as well that stand next to others, or where the drive might have moved them, at
-/// reversals and steps of the load. Gives how many are left out.
+/// Where many rows are out, those are as well that are off the cubic through the rows before and after by far more than
+/// usual, by `least` and by more than these. Gives how many are left out.
 fn leave_out_the_doubtful(log: &mut Log, least: f64) -> usize {
-    let error = log.of(Quantity::Error);
-    let is_doubtful = |row: &usize| {
-        let Range { start, end } = log.around(*row);
-        if end - start <= 4 * AROUND_ONE || *row < start + AROUND_ONE || row + AROUND_ONE >= end {
-            return false;
-        }
-        let before = level(error, row.saturating_sub(WIDELY_AROUND).max(start)..*row);
-        let after = level(error, row + 1..(row + 1 + WIDELY_AROUND).min(end));
-        let (from_before, from_after) = (error[*row] - before, error[*row] - after);
-        let by = from_before.abs().min(from_after.abs());
-        from_before * from_after > 0.0 && by > least && (after - before).abs() < 0.5 * by
+    let (error, rows) = (log.of(Quantity::Error), log.len());
+    let off = |k: usize| {
+        let beside = [k - 2, k - 1, k + 1, k + 2];
+        (error[k] - cubic_at_zero(beside.map(|j| (log.line[j] as f64 - log.line[k] as f64, error[j])))).abs()
     };
-    let rows = log.len();
-    let doubtful = (0..rows).filter(is_doubtful).collect::<Vec<usize>>();
+    let mut by = vec![0.0; rows];
+    log.sessions().for_each(|of| (of.start + 2..of.end.saturating_sub(2)).for_each(|k| by[k] = off(k)));
+    let least = least.max(TAIL * MAD_TO_STD * median_of(&mut by.clone()));
+    let is_doubtful = |k: &usize| by[*k] > least && by[*k - 2..*k + 3].iter().all(|beside| *beside <= by[*k]);
+    let doubtful: Vec<usize> = (2..rows.saturating_sub(2)).filter(is_doubtful).collect();
     log.leave_out(&marked(rows, doubtful));
     rows - log.len()
 }
@@ -262,7 +298,7 @@ fn report(log: &Log, found: &[Out], channel: Quantity, treatment: Treatment, don
 }
 
 /// Whether rows gather at the same angle of a wheel, more than all rows do.
-pub(super) fn repeat_with_position(generator: &[f64], found: &[Out], gear: &Gear) -> bool {
+fn repeat_with_position(generator: &[f64], found: &[Out], gear: &Gear) -> bool {
     let n = found.len() as f64;
     if n < FEW as f64 {
         return false;

@@ -2,11 +2,10 @@
 //!
 //! Between two readings the drive moves on: an instant that is off by τ puts the error off by τ times the speed. Where
 //! τ scatters, the scatter of neighbouring rows grows with the speed, its square by (τ · speed)²; at rest nothing
-//! shows. Waves of the drive scatter, too, where fast rows are too far apart to follow them, but by no such law. Some
-//! loggers read single rows late, by far more than the others and always to the same side.
+//! shows. Waves of the drive scatter, too, where fast rows are too far apart to follow them, but by no such law.
 //!
 //! The scatter of a row is its residual when a cubic goes through the rows around it. Rows then weigh what
-//! noise and scatter together leave of them; rows that were read late are left out.
+//! noise and scatter together leave of them.
 //!
 //! Where it is the generator that is read at scattered instants, or in coarse counts, its angle shows it: what it is
 //! off by is in the error, over the ratio, with the sign turned, at any pace. An output that follows a generator which
@@ -14,12 +13,10 @@
 
 use std::ops::Range;
 
-use super::outliers::repeat_with_position;
 use super::resolution::seen;
-use super::{ARCSEC, Findings, farthest, marked};
+use super::{ARCSEC, Findings};
 use crate::least_squares::Normal;
 use crate::measurement::columns::Quantity;
-use crate::measurement::cubic_at_zero;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
@@ -37,39 +34,18 @@ const LEAST_RAD: f64 = 1.0 * ARCSEC;
 const LEAST_OF_NOISE: f64 = 0.3;
 /// Fall of χ² by the scatter that grows with the speed: five standard deviations. *Source*: by definition.
 const CERTAIN: f64 = 25.0;
-/// Classes are no better known than this share of their variance: steps and teeth are in it, too. *Guess*.
-const CLASS_DOUBT: f64 = 0.05;
-/// A row is read late if it is off by this multiple of what its speed lets expect. *Guess*: lowered from 5, which
-/// normal rows exceed in one case of two million, to one of sixteen thousand.
-const LATE: f64 = 4.0;
-/// Late rows hide others near them: they are looked for this many times, each time without those found. *Guess*.
-const LATE_PASSES: usize = 5;
-/// Late rows are reported from this share of the rows in motion on, up to a third, which are no exceptions… *Guess*:
-/// sixty times what normal rows beyond [`LATE`] make.
-const LATE_SHARE: [f64; 2] = [0.004, 0.35];
-/// …and from this number on. *Guess*: enough to see that they are off to one side.
-const LATE_ROWS: usize = 30;
-/// Of them this share is off to the same side, seen in the direction of motion. *Guess*: thirty rows at random are so
-/// in one case of seven hundred.
-const ONE_SIDED: f64 = 0.8;
-/// In motion is above this share of the speed that a twentieth of the rows exceed. *Guess*: slower, a late row hardly
-/// shows.
-const IN_MOTION: f64 = 0.3;
-/// Late rows that cannot be distinguished from others are up to this many times those that can. *Guess*.
-const UNSEEN: f64 = 2.0;
-/// The line fits within this χ² a class: waves of the drive miss it. *Source*: the mean of χ² is the degrees of freedom.
-const MISFIT: f64 = 1.0;
 /// The drive moves evenly where the scatter of the generator's angle is below this share of what it turns by in a fast
 /// row. *Guess*: between rows from stop to stop it is 0.7 and more.
 const EVEN: f64 = 0.5;
+/// Classes are no better known than this share of their variance: steps and teeth are in it, too. *Guess*.
+const CLASS_DOUBT: f64 = 0.05;
+/// The line fits within this χ² a class: waves of the drive miss it. *Source*: the mean of χ² is the degrees of freedom.
+const MISFIT: f64 = 1.0;
 /// Scatter of the error against that of the generator's angle over the ratio is −1 within this, where it is that angle
 /// that is misread: what other noise of the angle and motion that is real leave of it. *Guess*.
 const MISREAD: f64 = 0.15;
 /// Share of the rows that decide it: those that are farthest off are something else. *Guess*.
 const NEAR: f64 = 0.99;
-/// Quantile of absolute values that a third of them, being far off, hardly moves, and its value for the standard normal
-/// distribution. *Guess* for the quantile; the value is exact to its digits.
-const LOW: (f64, f64) = (0.15, 0.1891);
 /// Variance of the scatter of a row over that of its error. *Source*: derived, the sum of the squares of 1, −4, 6, −4,
 /// 1 over that of the middle one.
 const SCATTER_GAIN: f64 = 70.0 / 36.0;
@@ -81,9 +57,6 @@ struct Class {
     rows: f64,
 }
 
-/// A row that was read late, and how far it is off, rad.
-type Late = (usize, f64);
-
 /// Rows as they were read.
 struct Reads<'a> {
     log: &'a Log,
@@ -92,8 +65,6 @@ struct Reads<'a> {
     turned: Vec<f64>,
     /// Change of the output from row to row, rad.
     speed: Vec<f64>,
-    /// Rows that are not late, in order.
-    good: Vec<usize>,
 }
 
 impl<'a> Reads<'a> {
@@ -104,41 +75,18 @@ impl<'a> Reads<'a> {
         };
         let speed = |(a, b): (usize, usize)| (turned[b] - turned[a]) / (b - a).max(1) as f64;
         let speed = log.sessions().flat_map(of_session).map(speed).collect();
-        Reads { log, error: log.of(Quantity::Error), speed, good: (0..log.len()).collect(), turned }
+        Reads { log, error: log.of(Quantity::Error), speed, turned }
     }
 
-    /// By how far a good row is off the cubic through the two good rows before and after it, rad; 0 near the ends.
-    fn off(&self, place: usize) -> f64 {
-        let Some([a, b, row, c, d]) = place.checked_sub(2).and_then(|from| self.good.get(from..)?.first_chunk()) else {
-            return 0.0;
-        };
-        // Neighbours in time, not across what was left out.
-        if d - a > 2 * 5 || self.log.number(*a) != self.log.number(*d) {
-            return 0.0;
-        }
-        self.error[*row] - cubic_at_zero([a, b, c, d].map(|at| (*at as f64 - *row as f64, self.error[*at])))
-    }
-
-    /// Rows off by far more than their speed lets expect, and by more than their neighbours: they leave the good ones.
-    fn take_late(&mut self, known: &[Class]) -> Vec<Late> {
-        let off: Vec<f64> = (0..self.good.len()).map(|place| self.off(place)).collect();
-        let is_late = |place: &usize| {
-            let near = &off[place.saturating_sub(2)..(place + 3).min(off.len())];
-            let size = off[*place].abs();
-            size > LATE * expected(known, self.speed[self.good[*place]]) && near.iter().all(|near| near.abs() <= size)
-        };
-        let late: Vec<Late> = (0..off.len()).filter(is_late).map(|place| (self.good[place], off[place])).collect();
-        self.good.retain(|row| late.binary_search_by_key(row, |(late, _)| *late).is_err());
-        late
-    }
-
-    /// Scatter of the error and of the generator's angle over the ratio, and row, where five good rows follow one
-    /// another: how far the middle one is off the cubic through the others, (-1, 4, -6, 4, -1) / 6 of the values.
+    /// Scatter of the error and of the generator's angle over the ratio, and row, where five rows follow one another
+    /// and none was left out: how far the middle one is off the cubic through the others, (-1, 4, -6, 4, -1) / 6 of the
+    /// values.
     fn scatter(&self) -> impl Iterator<Item = (f64, f64, usize)> + '_ {
         let off = |e: &[f64]| (6.0 * e[2] - 4.0 * (e[1] + e[3]) + e[0] + e[4]) / 6.0;
-        let is_one = |rows: &&[usize]| rows[4] - rows[0] == 4 && self.log.number(rows[0]) == self.log.number(rows[4]);
-        let fives = self.good.windows(5).filter(is_one).map(|rows| rows[0]..rows[4] + 1);
-        fives.map(move |rows| (off(&self.error[rows.clone()]), off(&self.turned[rows.clone()]), rows.start + 2))
+        let middles = self.log.sessions().flat_map(|rows| rows.start + 2..rows.end.saturating_sub(2));
+        let follow = |k: &usize| self.log.line[k + 2] == self.log.line[k - 2] + 4;
+        let of_row = move |k: usize| (off(&self.error[k - 2..k + 3]), off(&self.turned[k - 2..k + 3]), k);
+        middles.filter(follow).map(of_row)
     }
 }
 
@@ -186,7 +134,7 @@ impl Jitter {
 
     /// By scatter that grows with the speed.
     fn by_speed(reads: &Reads<'_>, fast: f64) -> Option<Jitter> {
-        let classes = classes(reads, fast, |off| MAD_TO_STD * median_of(off));
+        let classes = classes(reads, fast);
         let floor = classes.iter().map(|class| class.variance).fold(f64::INFINITY, f64::min).max(1e-30);
         // Neighbouring scatters share rows: a class is worth about a third of its rows. A median deviation is known to
         // 1.17 / sqrt(n).
@@ -210,16 +158,15 @@ impl Jitter {
     }
 }
 
-/// Scatter by speed, of classes with equally many rows. `spread` makes a standard deviation of absolute values, which
-/// it may overwrite. Between rows from stop to stop there is no speed.
-fn classes(reads: &Reads<'_>, fast: f64, spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class> {
+/// Scatter by speed, of classes with equally many rows. Between rows from stop to stop there is no speed.
+fn classes(reads: &Reads<'_>, fast: f64) -> Vec<Class> {
     let even = reads.scatter().filter(|(_, turned, _)| turned.abs() < EVEN * fast);
     let mut rows: Vec<(f64, f64)> = even.map(|(off, _, row)| (reads.speed[row].abs(), off.abs())).collect();
     rows.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let of = |class: &[(f64, f64)]| {
         let (mut off, rows): (Vec<f64>, f64) = (class.iter().map(|(_, off)| *off).collect(), class.len() as f64);
         let square = class.iter().map(|(speed, _)| speed * speed).sum::<f64>() / rows;
-        Class { speed: square.sqrt(), variance: spread(&mut off).powi(2) / SCATTER_GAIN, rows }
+        Class { speed: square.sqrt(), variance: (MAD_TO_STD * median_of(&mut off)).powi(2) / SCATTER_GAIN, rows }
     };
     rows.chunks(rows.len().div_ceil(CLASSES).max(CLASS_ROWS))
         .filter(|class| class.len() >= CLASS_ROWS / 2)
@@ -227,14 +174,13 @@ fn classes(reads: &Reads<'_>, fast: f64, spread: impl Fn(&mut [f64]) -> f64) -> 
         .collect()
 }
 
-/// Finds angles that are not read at one instant: rows weigh what their speed leaves of them, and rows that were read
-/// late are left out.
+/// Finds angles that are not read at one instant: rows weigh what their speed leaves of them.
 pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     let rows = log.len();
     if rows < CLASSES * CLASS_ROWS {
         return;
     }
-    let mut reads = Reads::new(log, gear);
+    let reads = Reads::new(log, gear);
     let fast = quantile_of(&mut reads.speed.iter().map(|speed| speed.abs()).collect::<Vec<f64>>(), 0.95);
     if fast == 0.0 {
         return;
@@ -245,55 +191,32 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         log.loudness = Some(vec![1.0; rows]);
         return;
     }
-    let late = late_rows(&mut reads, fast, gear);
-    let by_speed = Jitter::by_speed(&reads, fast)
-        .filter(|jitter| misread.is_none() && !is_of_counts(log, gear, Quantity::Output, jitter.rows * fast));
-    if late.is_empty() && misread.is_none() && by_speed.is_none() {
-        return;
-    }
-    let jitter = misread.map(|(jitter, _)| jitter).or(by_speed);
-    // Rows that are late by less than can be detected stay: as many again, and as late, on the mean.
+    let by_speed = || {
+        Jitter::by_speed(&reads, fast).filter(|jitter| !is_of_counts(log, gear, Quantity::Output, jitter.rows * fast))
+    };
+    let Some(Jitter { noise, rows: jitter_rows }) = misread.map(|(jitter, _)| jitter).or_else(by_speed) else { return };
     let speed = reads.speed;
-    let by_rows = |(row, off): &Late| (off / speed[*row].abs().max(IN_MOTION * fast)).abs();
-    let late_rows_each = median_of(&mut late.iter().map(by_rows).collect::<Vec<f64>>());
-    let late_rows = late.len();
-    let late_share = late_rows as f64 / rows as f64;
     let period_s = period_s(log);
-    let jitter_ms = jitter.as_ref().and_then(|jitter| Some(1e3 * period_s? * jitter.rows));
-    let late_rad = farthest(late.iter().map(|(_, off)| *off)).abs();
-    let size_rad = jitter.as_ref().map_or(late_rad, |jitter| jitter.rows * fast);
-    let scatters = jitter.as_ref().map(|Jitter { noise, rows }| {
-        let of_time = jitter_ms.map_or(format!("{rows:.4} rows"), |ms| format!("{ms:.3} ms"));
+    let jitter_ms = period_s.map(|period_s| 1e3 * period_s * jitter_rows);
+    let size_rad = jitter_rows * fast;
+    findings.add(log.fault(FaultName::ReadJitter, 0..rows), None::<Quantity>, Treatment::Masked, |fault| {
+        fault.size_arcsec = Some(size_rad / ARCSEC);
+        fault.measures.jitter_ms = jitter_ms;
+        let of_time = jitter_ms.map_or(format!("{jitter_rows:.4} rows"), |ms| format!("{ms:.3} ms"));
         format!(
-            "the time between them scatters by {of_time}, {:.1} arcsec at full speed and {:.1} of noise: a fast row \
-             is worth {:.2} of one at rest",
+            "the two angles are not read at one instant: the time between them scatters by {of_time}, {:.1} arcsec at \
+             full speed and {:.1} of noise: a fast row is worth {:.2} of one at rest",
             size_rad / ARCSEC,
             noise / ARCSEC,
             noise * noise / (noise * noise + size_rad * size_rad)
         )
     });
-    let are_late = (late_rows > 0).then(|| {
-        format!(
-            "{late_rows} rows ({:.1} %) are read late, by up to {:.0} arcsec: they are left out",
-            100.0 * late_share,
-            late_rad / ARCSEC
-        )
-    });
-    let said: Vec<String> = scatters.into_iter().chain(are_late).collect();
-    findings.add(log.fault(FaultName::ReadJitter, 0..rows), None::<Quantity>, Treatment::Masked, |fault| {
-        fault.size_arcsec = Some(size_rad / ARCSEC);
-        fault.measures.jitter_ms = jitter_ms;
-        fault.measures.late_rows = Some(late_rows as u64).filter(|rows| *rows > 0);
-        format!("the two angles are not read at one instant: {}", said.join("; "))
-    });
-    let Jitter { noise, rows: jitter_rows } = jitter.unwrap_or(Jitter { noise: 1.0, rows: 0.0 });
-    log.unsure_s = (jitter_rows + UNSEEN * late_share * late_rows_each) * period_s.unwrap_or(1.0);
+    log.unsure_s = log.unsure_s.max(jitter_rows * period_s.unwrap_or(1.0));
     // Each row has its noise against that of a row of mean worth.
     let noise = noise.max(1e-3 * jitter_rows * fast);
     let loud: Vec<f64> = speed.iter().map(|speed| noise.hypot(jitter_rows * speed)).collect();
     let worth = loud.iter().map(|loud| loud.powi(-2)).sum::<f64>() / rows as f64;
     log.loudness = Some(loud.iter().map(|loud| loud * worth.sqrt()).collect());
-    log.leave_out(&marked(rows, late.into_iter().map(|(row, _)| row)));
 }
 
 /// Whether what an angle is off by, rad at the output, is that it is read in counts, within half of one: that is its
@@ -303,49 +226,8 @@ fn is_of_counts(log: &Log, gear: &Gear, channel: Quantity, off: f64) -> bool {
     seen(log, gear).into_iter().any(|(of, step)| is_it(of) && off < 0.5 * step)
 }
 
-/// Scatter of a row of this speed, rad.
-fn expected(known: &[Class], speed: f64) -> f64 {
-    let off = |class: &&Class| (class.speed - speed.abs()).abs();
-    let class = known.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-    class.map_or(f64::INFINITY, |class| (class.variance * SCATTER_GAIN).sqrt())
-}
-
-/// Rows that were read late, which are no good ones then: off by far, enough of them in motion, to one side of it, at
-/// no one place of the drive. Else none, and all rows are good.
-fn late_rows(reads: &mut Reads<'_>, fast: f64, gear: &Gear) -> Vec<Late> {
-    reads.good = (0..reads.speed.len()).collect();
-    let mut late: Vec<Late> = Vec::new();
-    for _ in 0..LATE_PASSES {
-        let known = classes(reads, fast, |off| quantile_of(off, LOW.0) / LOW.1);
-        let more = reads.take_late(&known);
-        // Most logs end here.
-        let few = more.len() < LATE_ROWS;
-        late.extend(more);
-        if few {
-            break;
-        }
-    }
-    late.sort_unstable_by_key(|(row, _)| *row);
-    let moves = |speed: &f64| speed.abs() > IN_MOTION * fast;
-    let moving = reads.speed.iter().filter(|speed| moves(speed)).count() as f64;
-    // Whether each that moves is ahead.
-    let moving_late = late.iter().map(|(row, off)| (reads.speed[*row], off)).filter(|(speed, _)| moves(speed));
-    let ahead: Vec<bool> = moving_late.map(|(speed, off)| off * speed > 0.0).collect();
-    let count = ahead.len() as f64;
-    let forward = ahead.iter().filter(|ahead| **ahead).count() as f64;
-    let are_late = ahead.len() >= LATE_ROWS
-        && (LATE_SHARE[0]..=LATE_SHARE[1]).contains(&(count / moving))
-        && forward.max(count - forward) >= ONE_SIDED * count
-        && !repeat_with_position(reads.log.of(Quantity::Generator), &late, gear);
-    if !are_late {
-        reads.good = (0..reads.speed.len()).collect();
-        late.clear();
-    }
-    late
-}
-
 /// Median period of the rows, s.
-fn period_s(log: &Log) -> Option<f64> {
+pub(super) fn period_s(log: &Log) -> Option<f64> {
     let time = log.get(Quantity::Time)?;
     let mut steps: Vec<f64> = log.continued().map(|row| time[row] - time[row - 1]).collect();
     (!steps.is_empty()).then(|| median_of(&mut steps))
@@ -353,6 +235,7 @@ fn period_s(log: &Log) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::outliers;
     use super::*;
     use crate::measurement::Session;
     use crate::measurement::fault::Measures;
@@ -385,8 +268,11 @@ mod tests {
     fn checked(jitter_s: f64, late: f64) -> (Session, Option<Measures>) {
         let mut sessions = vec![session(jitter_s, late)];
         let mut findings = Findings::default();
-        let gear = Gear { tooth_pitch_rad: Some(std::f64::consts::TAU / 200.0), ..Gear::of_ratio(RATIO) };
-        Log::on(&mut sessions, |log| check(log, &gear, &mut findings));
+        let gear = Gear::of_ratio(RATIO);
+        Log::on(&mut sessions, |log| {
+            outliers::check(log, &gear, &mut findings);
+            check(log, &gear, &mut findings);
+        });
         let measures = findings.faults.first().map(|fault| fault.measures);
         (sessions.remove(0), measures)
     }
