@@ -45,12 +45,8 @@ const AROUND_ONE: usize = 3;
 const AROUND: usize = 15;
 /// If more than this share of the rows is out, these are not outliers but the noise. *Guess*: of normal rows none is.
 const SHARE: f64 = 0.1;
-/// If more than this share of the rows is out, [`OTHERS_OUT`] of the rows around one do not count for what is usual
-/// there. *Guess*: then another one is around every tenth of them.
+/// If more than this share of the rows is out, others are out by less. *Guess*: of normal rows none is.
 const MANY: f64 = 0.003;
-/// Rows around one that may be out as well. *Source*: derived, of 30 rows of which 5 % are out more are so in one case
-/// of fifty (Poisson). Where as many are out as [`SHARE`] allows, it is seven: *guess*, that few files have so many.
-const OTHERS_OUT: usize = 4;
 /// Mean resultant length above which four or more outliers repeat with position: a damaged tooth, which is the drive.
 /// *Guess*: four at random exceed it at one angle in one case of forty.
 const REPEATS: f64 = 0.9;
@@ -103,9 +99,9 @@ fn out_by(values: &[f64], row: usize) -> f64 {
 type Out = (usize, f64);
 
 /// Rows of a channel that are out by more than `least` in their session.
-fn in_sessions(log: &Log, channel: Quantity, least: f64, others: usize) -> Vec<Out> {
+fn in_sessions(log: &Log, channel: Quantity, least: f64) -> Vec<Out> {
     let of = |rows: Range<usize>| {
-        let found = rows_out(log.of(channel).get(rows.clone()).unwrap_or_default(), least, others);
+        let found = rows_out(log.of(channel).get(rows.clone()).unwrap_or_default(), least);
         found.into_iter().map(move |(row, by)| (rows.start + row, by))
     };
     log.sessions().flat_map(of).collect()
@@ -116,8 +112,8 @@ fn are_many(found: &[Out], log: &Log) -> bool {
     found.len() as f64 > MANY * log.len() as f64
 }
 
-/// Rows that are out by more than `least`, and by far more than all around them but `others` of them.
-fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
+/// Rows that are out by more than `least`, and by far more than all around them but one of them.
+fn rows_out(values: &[f64], least: f64) -> Vec<Out> {
     let mut found = Vec::new();
     for row in AROUND_ONE..values.len().saturating_sub(AROUND_ONE) {
         // The cheaper bound first: it is the larger one.
@@ -129,7 +125,7 @@ fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
         let around = row.saturating_sub(AROUND)..(row + AROUND + 1).min(values.len());
         let mut usual: Vec<f64> = around.filter(|k| *k != row).map(|k| out_by(values, k).abs()).collect();
         usual.sort_unstable_by(f64::total_cmp);
-        let usual = usual.iter().rev().nth(others).copied().unwrap_or(0.0);
+        let usual = usual.iter().rev().nth(1).copied().unwrap_or(0.0);
         let step = (level(values, row - AROUND_ONE..row) - level(values, row + 1..row + 1 + AROUND_ONE)).abs();
         if by.abs() > OUT_OF_AROUND * usual && step < 0.5 * by.abs() {
             found.push((row, by));
@@ -152,10 +148,7 @@ fn of_error(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     let resolution = seen(log, gear).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
     let largest_n_m = largest_torque(log);
-    let mut found = in_sessions(log, Quantity::Error, least, 1);
-    if are_many(&found, log) {
-        found = in_sessions(log, Quantity::Error, least, OTHERS_OUT);
-    }
+    let found = in_sessions(log, Quantity::Error, least);
     let swings = |(row, _): &Out| {
         let session = log.around(*row);
         let torque = log.get(Quantity::Torque).map(|torque| &torque[session.clone()]);
@@ -270,7 +263,7 @@ fn of_load(log: &mut Log, channel: Quantity, findings: &mut Findings) {
     if least == 0.0 {
         return;
     }
-    let found = in_sessions(log, channel, least, 1);
+    let found = in_sessions(log, channel, least);
     let large = found.iter().any(|(_, by)| by.abs() > LARGE_OF_RANGE * range);
     let too_many = found.len() as f64 > SHARE * log.len() as f64;
     if found.is_empty() || too_many || (found.len() < FEW && !large) {
@@ -362,7 +355,7 @@ mod tests {
     #[test]
     fn the_tip_of_a_load_is_borne_out_by_its_sides_and_a_spike_is_not() {
         let mut load: Vec<f64> = (0..41).map(|k| 40.0 - 1.5 * (f64::from(k) - 20.0).abs()).collect();
-        let found = |load: &[f64]| rows_out(load, 1.0, 1).iter().map(|(row, _)| *row).collect::<Vec<_>>();
+        let found = |load: &[f64]| rows_out(load, 1.0).iter().map(|(row, _)| *row).collect::<Vec<_>>();
         assert!(out_by(&load, 20) > 2.0, "a tip stands above the rows beside");
         assert_eq!(found(&load), [0_usize; 0]);
         load[10] += 20.0;
