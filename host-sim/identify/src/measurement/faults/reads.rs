@@ -187,13 +187,11 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     }
     // By what was measured alone: waves of a fast drive, once they are fitted, follow what its angle is misread by.
     let misread = Jitter::of_generator(&reads, fast);
-    if misread.as_ref().is_some_and(|(_, off)| is_of_counts(log, gear, Quantity::Generator, *off)) {
+    if misread.as_ref().is_some_and(|(_, off)| is_of_counts(log, gear, *off)) {
         log.loudness = Some(vec![1.0; rows]);
         return;
     }
-    let by_speed = || {
-        Jitter::by_speed(&reads, fast).filter(|jitter| !is_of_counts(log, gear, Quantity::Output, jitter.rows * fast))
-    };
+    let by_speed = || Jitter::by_speed(&reads, fast);
     let Some(Jitter { noise, rows: jitter_rows }) = misread.map(|(jitter, _)| jitter).or_else(by_speed) else { return };
     let speed = reads.speed;
     let period_s = period_s(log);
@@ -219,11 +217,10 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     log.loudness = Some(loud.iter().map(|loud| loud * worth.sqrt()).collect());
 }
 
-/// Whether what an angle is off by, rad at the output, is that it is read in counts, within half of one: that is its
-/// resolution, and known as such.
-fn is_of_counts(log: &Log, gear: &Gear, channel: Quantity, off: f64) -> bool {
-    let is_it = |of: Quantity| (of == Quantity::Generator) == (channel == Quantity::Generator);
-    seen(log, gear).into_iter().any(|(of, step)| is_it(of) && off < 0.5 * step)
+/// Whether what the generator is off by, rad at the output, is that it is read in counts, within half of one: that is
+/// its resolution, and known as such.
+fn is_of_counts(log: &Log, gear: &Gear, off: f64) -> bool {
+    seen(log, gear).into_iter().any(|(of, step)| of == Quantity::Generator && off < 0.5 * step)
 }
 
 /// Median period of the rows, s.
