@@ -203,8 +203,8 @@ fn name_late(fault: &mut Fault, share: f64) {
     fault.advice = FaultName::ReadJitter.advice();
     fault.measures.late_rows = Some(rows);
     fault.what = format!(
-        "the two angles are not read at one instant: {rows} rows ({:.1} %) are read late, by up to {largest:.0} arcsec: \
-         they are left out",
+        "the two angles are not read at one instant: {rows} rows ({:.1} %) are read late, by up to {largest:.0} \
+         arcsec: they are left out",
         100.0 * share
     );
 }

@@ -39,7 +39,8 @@ const CERTAIN: f64 = 25.0;
 const EVEN: f64 = 0.5;
 /// Classes are no better known than this share of their variance: steps and teeth are in it, too. *Guess*.
 const CLASS_DOUBT: f64 = 0.05;
-/// The line fits within this χ² a class: waves of the drive miss it. *Source*: the mean of χ² is the degrees of freedom.
+/// The line fits within this χ² a class: waves of the drive miss it. *Source*: χ² has the mean of its degrees of
+/// freedom.
 const MISFIT: f64 = 1.0;
 /// Scatter of the error against that of the generator's angle over the ratio is −1 within this, where it is that angle
 /// that is misread: what other noise of the angle and motion that is real leave of it. *Guess*.
