@@ -362,31 +362,14 @@ pub fn noise(on: &Excitation<'_>, columns: &FreeColumns, explained: &[f64], unce
         Some(judged) => thrown_out(&judged, uncertain),
         None => uncertain.to_vec(),
     };
-    let mut judged: Vec<Option<Hypothesis>> = hypotheses.iter().map(|_| None).collect();
-    // Some cannot be judged: each is asked once.
-    let mut asked = vec![false; hypotheses.len()];
-    let mut best = 0;
-    let mut next = FIRST.to_vec();
-    // From a few up the evidence, until all beside the best have been judged.
-    while !next.is_empty() {
-        let judge = |k: &usize| (*k, judge_under(Whitener::new(rows, &uncertain, stride, hypotheses[*k])));
-        for (k, of) in next.par_iter().map(judge).collect::<Vec<_>>() {
-            judged[k] = of;
-            asked[k] = true;
-        }
-        let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |judged| judged.evidence);
-        let likeliest = (0..judged.len()).max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(0);
-        // A short recording does not tell a wander from none: then what it could hide is no cause.
-        let power = |k: &usize| hypotheses[*k].wander * hypotheses[*k].correlation_s.sqrt();
-        best = (0..judged.len())
-            .filter(|k| evidence(*k) >= evidence(likeliest) - AS_LIKELY)
-            .max_by(|a, b| power(a).total_cmp(&power(b)))
-            .unwrap_or(0);
-        next = [beside(likeliest), beside(best)].concat();
-        next.sort_unstable();
-        next.dedup();
-        next.retain(|k| !asked[*k]);
-    }
+    let judge = |noise: &Noise| judge_under(Whitener::new(rows, &uncertain, stride, *noise));
+    let judged: Vec<Option<Hypothesis>> = hypotheses.par_iter().map(judge).collect();
+    let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |judged| judged.evidence);
+    let most = (0..judged.len()).map(evidence).fold(f64::NEG_INFINITY, f64::max);
+    // A short recording does not tell a wander from none: then what it could hide is no cause.
+    let power = |k: &usize| hypotheses[*k].wander * hypotheses[*k].correlation_s.sqrt();
+    let likely = (0..judged.len()).filter(|k| evidence(*k) >= most - AS_LIKELY);
+    let best = likely.max_by(|a, b| power(a).total_cmp(&power(b))).unwrap_or(0);
     let worth = judged[best].as_ref().map_or(1.0, |judged| worth_of(&judged.innovations, &judged.whitener));
     (hypotheses[best], worth)
 }
@@ -403,21 +386,6 @@ fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
         |wander: f64, correlation: f64| Noise { white, wander: wander * white, correlation_s: correlation * unit };
     let all = WANDERS.iter().flat_map(|wander| CORRELATIONS_S.map(|correlation| with(*wander, correlation)));
     [Noise { white, wander: 0.0, correlation_s: 1.0 }].into_iter().chain(all).collect()
-}
-
-/// Hypotheses that are judged first: none, and the fastest and a slow one of three drifts. *Guess*: the best is reached
-/// from any of them.
-const FIRST: [usize; 7] = [0, 5, 7, 17, 19, 29, 31];
-
-/// A hypothesis and those beside it.
-fn beside(hypothesis: usize) -> Vec<usize> {
-    let width = CORRELATIONS_S.len();
-    let Some(at) = hypothesis.checked_sub(1) else { return (0..=width).collect() };
-    let (row, column) = (at / width, at % width);
-    let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
-    let grid =
-        around(row, WANDERS.len()).flat_map(|row| around(column, width).map(move |column| 1 + row * width + column));
-    if row == 0 { [0].into_iter().chain(grid).collect() } else { grid.collect() }
 }
 
 /// How well a hypothesis of the noise tells what is left.
