@@ -126,10 +126,6 @@ table! {
         #[serde(rename = "needs_changes")]
         Swings = ("speed and load stay as they are, or rows are means over some time: no load is seen to swing",
             Some("record steps of the load, stops and starts, and several speeds, each row read at one instant")),
-        /// An output that turns through half a turn.
-        #[serde(rename = "needs_half_output_turn")]
-        HalfOutputTurn = ("the output turns through less than half a turn",
-            Some("turn the output through a whole turn")),
         /// So much use that a drive may have worn meanwhile.
         #[serde(rename = "needs_use")]
         Use = ("the drive is used too little for wear in between",

@@ -128,7 +128,6 @@ impl<'a> Excitation<'a> {
             Need::Time => rows.recorded.time,
             Need::Motion => rows.speed.iter().any(|w| *w != 0.0),
             Need::Swings => dynamic::makes_a_load_swing(self),
-            Need::HalfOutputTurn => self.output_span_rad() >= PI,
             Need::Use => {
                 let turned = rows.travel.last().is_some_and(|travel| *travel >= USED_TURNS * 2.0 * PI);
                 let lasts = rows.recorded.time && self.scales.duration_s >= USED_S;

@@ -189,7 +189,6 @@ pub(crate) const OUTPUT_ENCODER_TILT: CauseSpec = CauseSpec {
     name: "output_encoder_tilt",
     words: "tilt of the output encoder",
     does: "two waves in an output turn, whatever the load",
-    needs: &[Need::HalfOutputTurn],
     in_table: InTable::No(OF_THE_OUTPUT_ENCODER),
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 10_000.0, Value(15.0)),
