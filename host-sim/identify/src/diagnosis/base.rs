@@ -248,9 +248,9 @@ impl Base {
         let unknown_n_m = if stated { 0.0 } else { DRAG_OF_LOAD * rows.load_scale() };
         add("drag", rows.direction.iter().map(against).collect(), unknown_n_m);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
-        // Of a gear that is known by its ratio nothing says how its spring hardens, nor, where a load goes with the
-        // angle of the output, what of the error is the spring's.
-        if nominal.teeth.is_none() {
+        // Of a spring that nobody has stated nothing says how it hardens, nor, where a load goes with the angle of the
+        // output, what of the error is the spring's.
+        if nominal.teeth.is_none() && nominal.spread.stiffness >= 1.0 {
             let scale = rows.load_scale().max(f64::MIN_POSITIVE);
             let waves = waves_of_load(rows);
             let (powers, spread) = if waves.is_some() { (POWERS, nominal.spread.stiffness) } else { (1, HARDENING) };

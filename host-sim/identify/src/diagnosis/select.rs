@@ -347,7 +347,7 @@ pub(super) fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<J
     };
     let change = fit.solution.coefficients[at];
     let z = change / floating[at].spread;
-    let physical = change >= -LARGEST_SHARE_LOST && law.physical(&[], Coefficients::new(&[Tag::SIZE], &[z]));
+    let physical = law.physical(&[], Coefficients::new(&[Tag::SIZE], &[change]));
     // On the wrong side it counts as far below as it has gone there.
     Some(Judged::above(Gate::Tolerance, if physical { z.abs() } else { -z.abs() }, OUT_OF_TOLERANCE))
 }

@@ -18,9 +18,6 @@ pub(crate) mod selection {
     /// What a term adds counts up to this many times what the nominal model, within its tolerance, cannot take over
     /// from it. *Chosen*.
     pub(crate) const TAKEN_OVER: f64 = 2.5;
-    /// A wind-up or a clearance cannot lose more of itself than this: beyond, something else stands in for
-    /// it. *Chosen*.
-    pub(crate) const LARGEST_SHARE_LOST: f64 = 0.95;
     /// Least size of a contribution, arcsec. *Guess*.
     pub(crate) const LEAST_ARCSEC: f64 = 1.5;
     /// Least size in units of the white noise. *Guess*.

@@ -126,10 +126,14 @@ fn stiffness_hardening() -> Law {
     .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
 }
 
+/// A wind-up cannot lose more of itself than this: beyond, something else stands in for it. *Chosen*.
+const LARGEST_SHARE_LOST: f64 = 0.95;
+
 fn stiffness_error() -> Law {
     let mut law =
         Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5).called(Tag::SIZE)])
-            .parameters_by(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c.of(Tag::SIZE)))]);
+            .parameters_by(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c.of(Tag::SIZE)))])
+            .physical_if(|_, c| c.of(Tag::SIZE) > -LARGEST_SHARE_LOST);
     law.acts.tolerance_of = Some(super::among::STIFFNESS);
     law
 }
