@@ -64,8 +64,9 @@ const MOST_GOES_ON: f64 = 0.9;
 struct Sampled<'a> {
     rows: &'a Rows,
     against: (&'a Nominal, Option<&'a Table<'a>>),
-    /// The rows.
+    /// The rows, and which of them are known together.
     places: Vec<usize>,
+    block: Vec<usize>,
     /// What floats.
     free: FreeSpan,
     /// The error without it, arcsec.
@@ -93,10 +94,10 @@ pub(super) fn waves(order: f64, angle: &[f64], places: &[usize]) -> [Vec<f64>; 2
 }
 
 /// What floats freely in every drive whatever its waves are, column by column at the places: zeros of the error and of
-/// sessions, ratio, speed, direction.
-fn floating(rows: &Rows, places: &[usize]) -> Vec<Vec<f64>> {
+/// up to so many sessions, ratio, speed, direction.
+fn floating(rows: &Rows, places: &[usize], zeros: usize) -> Vec<Vec<f64>> {
     let since = |start: usize| places.iter().map(|k| f64::from(u8::from(*k >= start))).collect();
-    let zeros = rows.sessions.iter().take(MOST_ZEROS + 1).map(|session| since(session.start));
+    let zeros = rows.sessions.iter().take(zeros + 1).map(|session| since(session.start));
     zeros.chain([&rows.output, &rows.speed, &rows.direction].map(|column| at(places, column))).collect()
 }
 
@@ -112,19 +113,25 @@ fn blocks(column: &[f64]) -> impl Iterator<Item = &[f64]> {
 }
 
 impl<'a> Sampled<'a> {
-    fn new(rows: &'a Rows, against: (&'a Nominal, Option<&'a Table<'a>>)) -> Sampled<'a> {
+    fn new(rows: &'a Rows, against: (&'a Nominal, Option<&'a Table<'a>>), zeros: usize) -> Sampled<'a> {
         let places = sample(rows);
         let nominal = against.0.harmonics.iter().map(|of| (of.order_per_generator_turn, &rows.generator));
         let wheels = [&rows.output, &rows.on_flexspline, &rows.on_circular_spline];
         let wheels = [1.0, 2.0].into_iter().flat_map(|order| wheels.map(|wheel| (order, wheel)));
         let all = nominal.chain(wheels).flat_map(|(order, angle)| waves(order, angle, &places));
-        let free = FreeSpan::default().beyond(floating(rows, &places).into_iter().chain(all));
+        let free = FreeSpan::default().beyond(floating(rows, &places, zeros).into_iter().chain(all));
         let mut error = free.freed(at(&places, &rows.error));
         let spread = spread(&error);
         error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
         let turned =
             rows.output.iter().zip(&rows.orientation).map(|(out, housing)| (out + housing).sin_cos()).collect();
-        Sampled { rows, against, places, free, error, load: rows.load_scale(), turned }
+        // What the zero of a session that does not float is off by is the same in all of its rows.
+        let block = |(place, k): (usize, &usize)| match zeros {
+            0 => rows.sessions.partition_point(|session| session.end <= *k),
+            _ => place / places.len().div_ceil(BLOCKS).max(1),
+        };
+        let block = places.iter().enumerate().map(block).collect();
+        Sampled { rows, against, places, block, free, error, load: rows.load_scale(), turned }
     }
 
     /// The error less what a table predicts apart from wind-up and clearance, which is ripple that the load shapes;
@@ -167,10 +174,11 @@ impl TorqueEffect {
         let [error, wound, play] = sampled.parts(PlayLaw::Held, &torque);
         let [wound, play] = [wound, play].map(|part| sampled.free.freed(part));
         let should: Vec<f64> = wound.iter().zip(&play).map(|(wound, play)| wound + play).collect();
-        let products: Vec<[f64; 2]> = blocks(&should)
-            .zip(blocks(&error))
-            .map(|(should, error)| [dot(should, should), dot(should, error)])
-            .collect();
+        let mut products = vec![[0.0; 2]; sampled.block.last().map_or(0, |last| last + 1)];
+        for (k, block) in sampled.block.iter().enumerate() {
+            products[*block][0] += should[k] * should[k];
+            products[*block][1] += should[k] * error[k];
+        }
         let all = products.iter().fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
         let share = all[1] / all[0].max(1e-12);
         let without: Vec<f64> = products.iter().map(|of| (all[1] - of[1]) / (all[0] - of[0]).max(1e-12)).collect();
@@ -214,24 +222,34 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     if rows.torque.iter().all(|torque| *torque == 0.0) {
         return None;
     }
-    let sampled = Sampled::new(&rows, (nominal, table));
+    let sampled = Sampled::new(&rows, (nominal, table), MOST_ZEROS);
     let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
     let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
     let seen = |effect: &TorqueEffect| effect.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
-    let none = robust_std(sampled.error.iter().copied());
-    let recorded = TorqueEffect::by(&sampled, 1.0);
+    let at_first = |sampled: &Sampled<'_>| (TorqueEffect::by(sampled, 1.0), robust_std(sampled.error.iter().copied()));
+    let (mut recorded, mut none) = at_first(&sampled);
     let too_soft = recorded.wind_up > FAR_TOO_SOFT;
     if seen(&recorded) && recorded.share > NO_EFFECT && !too_soft {
         return None;
     }
-    let explains = |(factor, effect): &(f64, TorqueEffect)| {
+    let explains = |(factor, effect): &(f64, TorqueEffect), recorded: &TorqueEffect, none: f64| {
         let of_this_drive = |share: f64| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&share);
         let most = if *factor == -1.0 { EXPLAINS_TURNED } else { EXPLAINS };
         let fits = of_this_drive(effect.share) && (!too_soft || of_this_drive(effect.wind_up));
         seen(effect) && fits && effect.share > CERTAIN * effect.std && effect.left < most * recorded.left.min(none)
     };
     let tried = factors(nominal.ratio).map(|factor| (factor, TorqueEffect::by(&sampled, factor)));
-    let best = tried.filter(explains).min_by(|a, b| a.1.left.total_cmp(&b.1.left));
+    let tried = tried.filter(|tried| explains(tried, &recorded, none));
+    let mut best = tried.min_by(|a, b| a.1.left.total_cmp(&b.1.left));
+    // Where each session keeps to one load, a zero of its own hides what that does; of three and more a line shows.
+    if !seen(&recorded) && best.is_none() && rows.zeros.is_empty() && rows.sessions_used().count() > 2 {
+        let by_session = Sampled::new(&rows, (nominal, table), 0);
+        (recorded, none) = at_first(&by_session);
+        best = Some((-1.0, TorqueEffect::by(&by_session, -1.0))).filter(|turned| explains(turned, &recorded, none));
+        if best.is_none() {
+            return None;
+        }
+    }
     let nothing = seen(&recorded) && 1.0 - recorded.share > CERTAIN * recorded.std && recorded.left > none;
     let (factor, name, what) = match best.map(|(factor, effect)| (unit_of(factor), factor, effect)) {
         // A stiffness that looks like another unit is a look, no word: a soft drive does the same.
@@ -439,7 +457,7 @@ pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, ta
     let Some(rows) = followed(recording, nominal) else { return };
     let stated = nominal.friction_torque_n_m;
     let of = if stated > 0.0 { stated } else { FRICTION_OF_LOAD * rows.load_scale() };
-    let sampled = Sampled::new(&rows, (nominal, table));
+    let sampled = Sampled::new(&rows, (nominal, table), MOST_ZEROS);
     let leaves = |friction_torque_n_m: f64| {
         let other = Nominal { friction_torque_n_m, ..nominal.clone() };
         // What floats does not depend on it.
@@ -475,7 +493,7 @@ pub(super) fn take_friction(recording: &mut Recording, nominal: &mut Nominal, ta
 /// names it and takes it off.
 pub(super) fn check_zero(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) {
     let Some(rows) = followed(recording, nominal) else { return };
-    let sampled = Sampled::new(&rows, (nominal, table));
+    let sampled = Sampled::new(&rows, (nominal, table), MOST_ZEROS);
     // A zero turns flanks over too early, which by itself looks like a play that goes over slowly.
     let by_law = PlayLaw::ALL.map(|law| (law, sampled.tried(law, [0.0; 4], CONSTANT)));
     let without_any = by_law.iter().map(|(_, tried)| sum(&tried[0], None)).fold(f64::INFINITY, f64::min);
@@ -572,7 +590,8 @@ pub(crate) fn check_degrees(
             (1..=most).flat_map(|order| waves(unit * f64::from(order), angle, &places)).collect::<Vec<_>>()
         };
         let of_output = [waves_to(ORDERS[0], 1.0, &rows.output), waves_to(ORDERS[1], degree, &rows.output)].concat();
-        let any = floating(&rows, &places).into_iter().chain(load.map(|of| at(&places, of))).chain(of_output);
+        let any =
+            floating(&rows, &places, MOST_ZEROS).into_iter().chain(load.map(|of| at(&places, of))).chain(of_output);
         let free = FreeSpan::default().beyond(any);
         let error = free.freed(at(&places, &rows.error));
         [1.0, degree].map(|unit| {
@@ -853,7 +872,7 @@ mod tests {
             let (send, receive) = std::sync::mpsc::channel();
             std::thread::spawn(move || {
                 let rows = Rows::new(&[session], &nominal);
-                let sampled = Sampled::new(&rows, (&nominal, None));
+                let sampled = Sampled::new(&rows, (&nominal, None), MOST_ZEROS);
                 let left = [CONSTANT, RIVALS, CONSTANT.start..RIVALS.end].map(|places| {
                     let tried = sampled.tried(PlayLaw::Held, [0.0; 4], places);
                     sum(least(&tried, None), None)
