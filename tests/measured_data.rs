@@ -559,6 +559,35 @@ fn the_play_of_a_single_turn_is_no_lost_index() {
     }
 }
 
+/// Back and forth at six paces: angles read two milliseconds apart lie off by another amount on each way.
+#[test]
+fn a_delay_of_the_rows_is_no_lost_index() {
+    for seed in 0..4 {
+        let log = |late_s: f64| {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let (mut bench, mut psi, mut pace) = (Bench { torque_n_m: Some(Vec::new()), ..Bench::default() }, 0.0, 0.0);
+            let paces: Vec<f64> = [1.0, -1.0].repeat(3).iter().map(|way| way * (5.0 + 9.0 * random.f64())).collect();
+            for k in 0..9000 {
+                pace += (paces[k / 1500] - pace) / 8.0;
+                psi += 0.02 * pace;
+                let torque: f64 = 20.0 * (k as f64 / 300.0 + seed as f64).sin();
+                let drive = 9.0 * torque + 20.0 * torque.signum() + 20.0 * (2.0 * psi).sin();
+                let error = drive * ARCSEC - late_s * pace / RATIO + 1.5 * ARCSEC * normal(&mut random);
+                bench.time_s.push(0.02 * k as f64);
+                bench.generator_rad.push(psi);
+                bench.output_rad.push(psi / RATIO + error);
+                bench.torque_n_m.as_mut().unwrap().push(torque);
+            }
+            bench.csv()
+        };
+        let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+        let image = calibrate(&[read(log(0.0).as_bytes()).unwrap()], &prior).unwrap().table.image;
+        let table = Table::check(&image).unwrap();
+        let rows = replay::read("m.csv", log(0.002), &ColumnMap::default(), &table, 20.0, true).unwrap();
+        assert!(rows.faults.is_empty(), "seed {seed}: {:?}", rows.faults);
+    }
+}
+
 #[test]
 fn teeth_that_slide_twice_are_no_lost_index() {
     let pitch = std::f64::consts::TAU / 190.0;

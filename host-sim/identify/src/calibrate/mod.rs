@@ -585,7 +585,7 @@ fn at_lost_index(
         return None;
     }
     let Fitted { rows, folds, model, .. } = fitted.as_ref().ok()?;
-    let (log, line, size_arcsec) = rows.lost_index(model, &folds.parts)?;
+    let (log, line, size_arcsec) = rows.lost_index(model, folds.parts.clone())?;
     let mut parted = given.to_vec();
     let file = parted.iter_mut().find(|file| file.file == files[log].file)?;
     part(file, line, size_arcsec, prior)?;
@@ -599,9 +599,8 @@ fn part(log: &mut Recording, line: u64, size_arcsec: f64, prior: &Prior<'_>) -> 
     let whole = &log.sessions[place];
     let behind = Session { own_zero: true, ..whole.part(row..whole.len()) };
     let pitches = whole_pitches(size_arcsec / ARCSEC_PER_RAD, &prior.nominal.gear(), WHOLE_PITCH, 0.0);
-    let flank = || "a load that is not recorded has turned the flank over".to_owned();
-    let or = pitches.map_or_else(flank, |pitches| format!("teeth have skipped by {pitches}"));
-    let then = format!(", or {or}; the zero behind it is fitted on its own");
+    let or = pitches.map_or_else(String::new, |pitches| format!(", or teeth have skipped by {pitches}"));
+    let then = format!("{or}; the zero behind it is fitted on its own");
     log.faults.push(Fault::lost_index(whole, row, size_arcsec, &then));
     let before = whole.part(0..row);
     log.sessions.splice(place..=place, [before, behind]);
@@ -665,7 +664,7 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         let recorded = Recorded::of(&files, &prior);
         let rows = settled(&files, &prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
         let none = Model { chosen: Vec::new(), coefficients: Vec::new(), scales: recorded.scales };
-        let Some((_, line, size)) = rows.lost_index(&none, &recorded.shown(PartName::ALL, &prior)) else { break };
+        let Some((_, line, size)) = rows.lost_index(&none, recorded.shown(PartName::ALL, &prior)) else { break };
         part(&mut log, line, size, &prior);
     }
     if set_anew(std::slice::from_ref(&log), &prior).is_some() {

@@ -353,9 +353,11 @@ impl Rows {
         correlation(&of(|at| at.torque_n_m), &[of(|_| 1.0), of(|at| at.output_rad.sin()), of(|at| at.output_rad.cos())])
     }
 
-    /// Where an encoder lost its index, in what a model leaves, beside all `parts` that may be there: the log, the line
-    /// from which on the error has another zero, and how far that is off, arcsec.
-    pub(crate) fn lost_index(&self, model: &Model, parts: &[PartName]) -> Option<(usize, u64, f64)> {
+    /// Where an encoder lost its index, in what a model leaves, beside all `parts` that may be there and a delay of
+    /// each log: the log, the line from which on the error has another zero, and how far that is off, arcsec.
+    pub(crate) fn lost_index(&self, model: &Model, mut parts: Vec<PartName>) -> Option<(usize, u64, f64)> {
+        let logs = self.means_arcsec.len();
+        parts.extend((0..logs).map(PartName::ReadingDelay));
         // Rows that do not count, and the end of a session, keep those beside them apart.
         let session = |row: &Row| self.loads[row.number].0;
         let place = |row: &Row| row.number + session(row);
@@ -364,11 +366,10 @@ impl Rows {
             left[place(row)] = Some(row.left_arcsec - model.adds_arcsec(&row.at));
         }
         let columns = || {
-            let logs = self.means_arcsec.len();
-            let mut columns = vec![vec![0.0; left.len()]; logs + width_of(parts)];
+            let mut columns = vec![vec![0.0; left.len()]; logs + width_of(&parts)];
             for row in &self.rows {
                 columns[row.at.log][place(row)] = 1.0;
-                let of_parts = columns[logs..].iter_mut().zip(parts::row(parts, &row.at, &model.scales));
+                let of_parts = columns[logs..].iter_mut().zip(parts::row(&parts, &row.at, &model.scales));
                 of_parts.for_each(|(column, value)| column[place(row)] = value);
             }
             columns
@@ -378,7 +379,7 @@ impl Rows {
         let held_n_m = HELD * self.loads.iter().fold(0.0, |most: f64, (_, load)| most.max(load.abs()));
         let held = |w: &[Row]| w.iter().all(|row| row.at.torque_n_m.abs() >= held_n_m);
         let stays = |w: &&[Row]| held(w) && w[0].at.way == w[1].at.way && flank(&w[0]) == flank(&w[1]);
-        let mut ends = vec![0; self.means_arcsec.len()];
+        let mut ends = vec![0; logs];
         self.rows.iter().for_each(|row| ends[row.at.log] = place(row) + 1);
         let places = self.rows.chunk_by(|a, b| session(a) == session(b)).flat_map(|rows| {
             let of = place(&rows[0])..ends[rows[0].at.log];

@@ -134,7 +134,7 @@ impl Fault {
     pub(crate) fn lost_index(session: &Session, row: usize, size_arcsec: f64, then: &str) -> Fault {
         let what = format!(
             "the error steps by about {size_arcsec:.0} arcsec within one row and stays there, whatever else the drive \
-             does: an encoder has lost its index{then}"
+             does: an encoder has lost its index, or a load that is not recorded has turned the flank over{then}"
         );
         let time_s = session.time_s.as_ref().map(|time| time[row]);
         let fault = Fault::new(FaultName::EncoderIndexJump, [session.line[row]; 2], 1);
