@@ -597,6 +597,11 @@ mod tests {
 
     /// What a log says of a drive known by its ratio, 95: each row has generator angle, error, arcsec, and load, N·m.
     fn by_ratio(row: impl Fn(f64, f64) -> [f64; 3]) -> (Subject<'static>, Diagnosed) {
+        by_ratio_and(None, row)
+    }
+
+    /// The same where a model states more than the ratio.
+    fn by_ratio_and(stated: Option<Nominal>, row: impl Fn(f64, f64) -> [f64; 3]) -> (Subject<'static>, Diagnosed) {
         let (mut text, columns) = ("time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned(), ColumnMap::default());
         let mut random = fastrand::Rng::with_seed(8);
         for k in 0..12_000 {
@@ -604,8 +609,11 @@ mod tests {
             let read = error + 2.0 * random.f64();
             text += &format!("{:.2},{psi:.6},{read:.4},{load:.4}\n", 0.01 * f64::from(k));
         }
-        let (drive, text) = ((Drive::hhd_95(), GeneratorKind::Cam), text.into_bytes());
-        let mut subject = Subject::of_ratio(95.0, drive, ("gear.csv", text.clone(), &columns)).unwrap();
+        let (drive, kind, text) = (Drive::hhd_95(), GeneratorKind::Cam, text.into_bytes());
+        let mut subject = match stated {
+            Some(nominal) => Subject::of_model(Model { nominal, causes: Vec::new() }, drive, kind),
+            None => Subject::of_ratio(95.0, (drive, kind), ("gear.csv", text.clone(), &columns)).unwrap(),
+        };
         let rows = parse_rows("gear.csv", text, &columns, &mut subject).unwrap();
         let done = diagnose_rows(rows, &subject, &Settings::default(), |_, _, _| {}).unwrap();
         (subject, done)
@@ -642,6 +650,13 @@ mod tests {
         let (finding, notes, _) = found(|_| 0.0);
         assert_eq!(finding, Finding::NothingFound);
         assert!(!notes.iter().any(|note| note.contains("judge by")), "{notes:?}");
+    }
+
+    /// Through 65 degrees of the output a tilt of its encoder and an eccentricity are told apart as far as they can be.
+    #[test]
+    fn two_waves_a_turn_have_their_name_in_a_part_of_it() {
+        let (finding, _, text) = found(|psi| 30.0 * (2.0 * psi / 95.0 + 0.5).sin());
+        assert!(finding == Finding::FaultFound && text.contains("  output_encoder_tilt ("), "{text}");
     }
 
     /// A ratio alone: wind-up, play with its friction and the waves of two lobes are those of the rows.
@@ -681,6 +696,24 @@ mod tests {
         assert!(read.zip(0..).all(|(read, k)| (read - weight(f64::from(k))).abs() < 0.01));
         assert_ne!(done.diagnosis.finding, Finding::FaultFound, "{}", done.diagnosis.text());
         assert!(done.recording.notes.iter().any(|note| note == GOES_WITH_OUTPUT), "{:?}", done.recording.notes);
+        // A model that states the spring does not: here it is stiffer than the drive.
+        let stiffness = vec![[0.0, ARCSEC_PER_RAD / 6.0]];
+        let stated = Nominal { ratio: 95.0, teeth: None, stiffness, backlash_arcsec: 0.0, ..catalogue_drive() };
+        let (_, done) = by_ratio_and(Some(stated.clone()), |k, noise| {
+            [angle(k), 8.0 * weight(k) + stated.harmonics_arcsec(angle(k)), weight(k) + 0.2 * noise]
+        });
+        assert!(done.diagnosis.text().contains("stiffness_ratio      "), "{}", done.diagnosis.text());
+    }
+
+    /// A sensor that is switched off, or on the motor's side: a weight may have turned the joint all the same.
+    #[test]
+    fn a_torque_that_is_noise_about_zero_is_none() {
+        let (_, done) = by_ratio(|k, noise| {
+            let psi = there_and_back(k).1;
+            [psi, 30.0 * (psi / 95.0).sin() + 20.0 * (2.0 * psi).sin(), 0.1 * noise]
+        });
+        assert!(done.recording.sessions.iter().all(|session| session.torque_n_m.is_none()));
+        assert!(done.diagnosis.text().contains("a load that was not recorded"), "{}", done.diagnosis.text());
     }
 
     /// A model that holds a tilt of the output's encoder: a calibration has it neither in its rows nor in its table.

@@ -46,6 +46,11 @@ use raw::RawFile;
 const NOISE: Range<f64> = 1e-5..0.05;
 /// … and the error shows it by fewer than this many standard deviations. *Source*: by convention.
 const CERTAIN: f64 = 5.0;
+/// A torque is noise about no load where its white noise is this share of all of it. *Guess*.
+const NOTHING_ELSE: f64 = 0.9;
+/// Note on such a torque.
+const SILENT: &str = "the torque is noise about zero in all rows, and the error shows nothing of it: it counts as not \
+                      recorded; where there was no load, put 0 in its column";
 /// More sessions than a person makes. *Guess*.
 const MANY_SESSIONS: usize = 50;
 
@@ -296,7 +301,11 @@ pub(crate) fn parse_at_least(
     faults::reads::check(&mut log, gear, &mut findings);
     faults::resolution::check(&mut log, gear, &mut findings);
     let mut sessions = log.into_sessions();
-    sessions.iter_mut().for_each(|session| load_without_noise(session, gear.ratio));
+    let silent = |session: &mut Session| load_without_noise(session, gear.ratio);
+    if sessions.iter_mut().map(silent).fold(true, |all, silent| all && silent) {
+        sessions.iter_mut().for_each(|session| session.torque_n_m = None);
+        findings.notes.push(SILENT.to_owned());
+    }
     // Each session of a guide log, whose columns nobody maps, has its own zero.
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= columns.is_empty());
     let Findings { mut faults, notes, .. } = findings;
@@ -306,17 +315,20 @@ pub(crate) fn parse_at_least(
 
 /// A load that the angle of the output and the way of a motion make, as a weight does, is theirs alone where all else
 /// of it is noise that the error does not show: a fit would take it for what tells a wind-up from waves of the output.
-fn load_without_noise(session: &mut Session, ratio: f64) {
-    let Some(torque) = &mut session.torque_n_m else { return };
+/// Gives whether it is nothing but noise.
+fn load_without_noise(session: &mut Session, ratio: f64) -> bool {
+    let Some(torque) = &mut session.torque_n_m else { return false };
     let wave = |of: fn(f64) -> f64| session.generator_rad.iter().map(|psi| of(psi / ratio)).collect();
     let of_angle = [vec![1.0; torque.len()], wave(f64::sin), wave(f64::cos), directions(&session.generator_rad)];
     let span = FreeSpan::default().beyond(of_angle);
     let noise = span.freed(torque.clone());
     let error = span.freed(session.error_rad.clone());
     let shown = correlation(&error, std::slice::from_ref(&noise)) * (noise.len() as f64).sqrt();
+    let silent = shown < CERTAIN && white_noise([torque.as_slice()]) > NOTHING_ELSE * rms(torque);
     if shown < CERTAIN && NOISE.contains(&(rms(&noise) / rms(torque))) {
         torque.iter_mut().zip(noise).for_each(|(torque, noise)| *torque -= noise);
     }
+    silent
 }
 
 /// Mends clock and holes of a log and leaves out the rows without an angle; how many had which angle.
