@@ -167,7 +167,7 @@ pub(super) fn delay_note(readings: &[Reading], logs: usize) -> Option<String> {
     (!delays.is_empty()).then(|| {
         format!(
             "{}: the effect grows with the speed, which no table knows, so the table is fitted without it; read both \
-             at one instant, or give the controller the delay",
+             at one instant, or give the controller the delay; a drag that grows with the speed does the same",
             delays.join("; ")
         )
     })

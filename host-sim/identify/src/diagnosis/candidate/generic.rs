@@ -22,9 +22,9 @@ fn of_unit_size(column: Vec<f64>) -> Vec<f64> {
 }
 
 /// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either
-/// way.
+/// way. So does an output that rubs.
 fn lash_before_the_generator() -> Law {
-    Law::new("lost motion before the generator", |on, shape| {
+    Law::new("friction of the output, or lost motion before the generator", |on, shape| {
         let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
         let mut held = vec![0.0; on.rows.len()];
         for session in &on.rows.sessions {
