@@ -246,9 +246,7 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
         let by_session = Sampled::new(&rows, (nominal, table), 0);
         (recorded, none) = at_first(&by_session);
         best = Some((-1.0, TorqueEffect::by(&by_session, -1.0))).filter(|turned| explains(turned, &recorded, none));
-        if best.is_none() {
-            return None;
-        }
+        best.as_ref()?;
     }
     let nothing = seen(&recorded) && 1.0 - recorded.share > CERTAIN * recorded.std && recorded.left > none;
     let (factor, name, what) = match best.map(|(factor, effect)| (unit_of(factor), factor, effect)) {

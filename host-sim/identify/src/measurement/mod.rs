@@ -301,8 +301,8 @@ pub(crate) fn parse_at_least(
     faults::reads::check(&mut log, gear, &mut findings);
     faults::resolution::check(&mut log, gear, &mut findings);
     let mut sessions = log.into_sessions();
-    let silent = |session: &mut Session| load_without_noise(session, gear.ratio);
-    if sessions.iter_mut().map(silent).fold(true, |all, silent| all && silent) {
+    let silent = sessions.iter_mut().map(|session| load_without_noise(session, gear.ratio)).collect::<Vec<bool>>();
+    if !silent.contains(&false) {
         sessions.iter_mut().for_each(|session| session.torque_n_m = None);
         findings.notes.push(SILENT.to_owned());
     }
