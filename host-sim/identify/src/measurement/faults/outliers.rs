@@ -215,15 +215,13 @@ const LATE_ROWS: usize = 30;
 /// …of which this share is off to the same side, seen in the direction of motion. *Guess*: thirty rows at random are so
 /// in one case of seven hundred.
 const ONE_SIDED: f64 = 0.8;
-
 /// Late rows that cannot be distinguished from others are up to this many times those that can. *Guess*.
 const UNSEEN: f64 = 2.0;
-
 /// By how much, over the generator's travel from row to row, rows are out that were read late: those are off to one
-/// side of the motion.
+/// side of the motion. At rest there is none.
 fn late_by(generator: &[f64], found: &[Out]) -> Option<f64> {
     let by_travel = |(row, by): &Out| 2.0 * by / (generator[row + 1] - generator[row - 1]);
-    let mut late: Vec<f64> = found.iter().map(by_travel).collect();
+    let mut late: Vec<f64> = found.iter().map(by_travel).filter(|late| late.is_finite()).collect();
     let ahead = late.iter().filter(|by| **by > 0.0).count();
     let most = ahead.max(late.len() - ahead);
     let are_late = late.len() >= LATE_ROWS && most as f64 >= ONE_SIDED * late.len() as f64;
@@ -350,6 +348,13 @@ mod tests {
             let found = findings.faults.iter().find(|fault| fault.name == FaultName::Outliers).expect("outliers");
             assert_eq!(found.rows as usize, left_out);
         }
+    }
+
+    #[test]
+    fn rows_that_are_out_at_rest_were_not_read_late() {
+        let found: Vec<Out> = (1..=60).map(|k| (2 * k, 1e-3)).collect();
+        let late_by = |step: f64| late_by(&(0..140).map(|k| step * f64::from(k)).collect::<Vec<f64>>(), &found);
+        assert!(late_by(0.0).is_none() && (late_by(0.1).unwrap() - 1e-2).abs() < 1e-9);
     }
 
     #[test]
