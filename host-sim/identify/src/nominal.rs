@@ -30,6 +30,8 @@ const STEPS_OF_A_PITCH: u32 = 16;
 const PLACES_OF_A_TURN: u32 = 4000;
 /// Half a backlash, or a wind-up, that shows nowhere, arcsec. *Guess*: it stands for none where one may be.
 const LEAST_ARCSEC: f64 = 0.1;
+/// Spread of a stiffness that nobody has stated, at least. *Guess*: all of it.
+pub(crate) const UNSTATED: f64 = 1.0;
 /// Waves in a turn of the generator, or of its wave on the wheel that turns, that every strain wave gear has, and their
 /// first overtone.
 pub(crate) const OF_TWO_LOBES: [f64; 2] = [2.0, 4.0];
@@ -275,7 +277,7 @@ impl Nominal {
         // Nor does a calibration know a spring, where loads go with the angle of the output or each log keeps to one.
         let [low, high] = table.torque_range_n_m().map(f64::from);
         let any = FARTHEST_WIND_UP_RAD * ARCSEC_PER_RAD / nominal.wind_up_arcsec(high.max(-low)).max(LEAST_ARCSEC);
-        let spread = Spread { stiffness: any, backlash, ..nominal.spread };
+        let spread = Spread { stiffness: any.max(UNSTATED), backlash, ..nominal.spread };
         let (harmonics, backlash_arcsec) = (harmonics.collect(), 2.0 * half_arcsec);
         let friction_torque_n_m = dead_zone_n_m(table);
         Nominal { ratio, teeth: None, harmonics, backlash_arcsec, friction_torque_n_m, spread, ..nominal }

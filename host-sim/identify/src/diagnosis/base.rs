@@ -20,7 +20,7 @@ use super::rows::Rows;
 use crate::calibrate::{SAME_TORQUE, TURNS_WITH_THE_OUTPUT};
 use crate::least_squares::FreeSpan;
 use crate::misfit::{about_mean, correlation};
-use crate::nominal::Nominal;
+use crate::nominal::{Nominal, UNSTATED};
 use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -250,7 +250,7 @@ impl Base {
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         // Of a spring that nobody has stated nothing says how it hardens, nor, where a load goes with the angle of the
         // output, what of the error is the spring's.
-        if nominal.teeth.is_none() && nominal.spread.stiffness >= 1.0 {
+        if nominal.teeth.is_none() && nominal.spread.stiffness >= UNSTATED {
             let scale = rows.load_scale().max(f64::MIN_POSITIVE);
             let waves = waves_of_load(rows);
             let (powers, spread) = if waves.is_some() { (POWERS, nominal.spread.stiffness) } else { (1, HARDENING) };
