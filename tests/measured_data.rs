@@ -571,11 +571,10 @@ fn a_delay_of_the_rows_is_no_lost_index() {
                 pace += (paces[k / 1500] - pace) / 8.0;
                 psi += 0.02 * pace;
                 let torque: f64 = 20.0 * (k as f64 / 300.0 + seed as f64).sin();
-                let drive = 9.0 * torque + 20.0 * torque.signum() + 20.0 * (2.0 * psi).sin();
-                let error = drive * ARCSEC - late_s * pace / RATIO + 1.5 * ARCSEC * normal(&mut random);
+                let drive = 9.0 * torque + 20.0 * (torque.signum() + (2.0 * psi).sin()) + 1.5 * normal(&mut random);
                 bench.time_s.push(0.02 * k as f64);
                 bench.generator_rad.push(psi);
-                bench.output_rad.push(psi / RATIO + error);
+                bench.output_rad.push((psi - late_s * pace) / RATIO + drive * ARCSEC);
                 bench.torque_n_m.as_mut().unwrap().push(torque);
             }
             bench.csv()

@@ -239,8 +239,7 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
         seen(effect) && fits && effect.share > CERTAIN * effect.std && effect.left < most * recorded.left.min(none)
     };
     let tried = factors(nominal.ratio).map(|factor| (factor, TorqueEffect::by(&sampled, factor)));
-    let tried = tried.filter(|tried| explains(tried, &recorded, none));
-    let mut best = tried.min_by(|a, b| a.1.left.total_cmp(&b.1.left));
+    let mut best = tried.filter(|tried| explains(tried, &recorded, none)).min_by(|a, b| a.1.left.total_cmp(&b.1.left));
     // Where each session keeps to one load, a zero of its own hides what that does; of three and more a line shows.
     if !seen(&recorded) && best.is_none() && rows.zeros.is_empty() && rows.sessions_used().count() > 2 {
         let by_session = Sampled::new(&rows, (nominal, table), 0);

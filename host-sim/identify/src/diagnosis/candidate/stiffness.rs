@@ -128,7 +128,6 @@ fn stiffness_hardening() -> Law {
 
 /// A wind-up cannot lose more of itself than this: beyond, something else stands in for it. *Chosen*.
 const LARGEST_SHARE_LOST: f64 = 0.95;
-
 fn stiffness_error() -> Law {
     let mut law =
         Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5).called(Tag::SIZE)])

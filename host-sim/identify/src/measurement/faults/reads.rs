@@ -188,7 +188,9 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     }
     // By what was measured alone: waves of a fast drive, once they are fitted, follow what its angle is misread by.
     let misread = Jitter::of_generator(&reads, fast);
-    if misread.as_ref().is_some_and(|(_, off)| is_of_counts(log, gear, *off)) {
+    // Where it is read in counts, within half of one, that is its resolution, and known as such.
+    let in_counts = |off: f64| seen(log, gear).iter().any(|(of, step)| *of == Quantity::Generator && off < 0.5 * step);
+    if misread.as_ref().is_some_and(|(_, off)| in_counts(*off)) {
         log.loudness = Some(vec![1.0; rows]);
         return;
     }
@@ -216,12 +218,6 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     let loud: Vec<f64> = speed.iter().map(|speed| noise.hypot(jitter_rows * speed)).collect();
     let worth = loud.iter().map(|loud| loud.powi(-2)).sum::<f64>() / rows as f64;
     log.loudness = Some(loud.iter().map(|loud| loud * worth.sqrt()).collect());
-}
-
-/// Whether what the generator is off by, rad at the output, is that it is read in counts, within half of one: that is
-/// its resolution, and known as such.
-fn is_of_counts(log: &Log, gear: &Gear, off: f64) -> bool {
-    seen(log, gear).into_iter().any(|(of, step)| of == Quantity::Generator && off < 0.5 * step)
 }
 
 /// Median period of the rows, s.
