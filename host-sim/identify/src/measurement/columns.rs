@@ -380,7 +380,7 @@ mod tests {
             ("generator=a:rad,output=a:rad", "column a stands for both generator and output"),
             ("generater=a", "temperature, orientation; did you mean `generator`?"),
             ("temp=a", "did you mean `temperature`?"),
-            ("generator=a:degrees", "mrad, count; did you mean `deg`?"),
+            ("generator=a:degs", "mrad, count; did you mean `deg`?"),
             ("torque=a:n.m", "did you mean `N.m`?"),
             ("temperature=a:c", "allowed: C, K, F; did you mean `C`?"),
             ("generator=a:count", "how many counts make a turn, for instance count/16777216"),

@@ -14,7 +14,7 @@ table! {
         /// rad
         Radian = (Family::Angle, &["rad"], 1.0),
         /// deg
-        Degree = (Family::Angle, &["deg", "°"], TAU / 360.0),
+        Degree = (Family::Angle, &["deg", "°", "degree", "degrees"], TAU / 360.0),
         /// gon: 400 make a turn
         Gon = (Family::Angle, &["gon"], TAU / 400.0),
         /// turn

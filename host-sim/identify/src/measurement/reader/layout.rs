@@ -216,7 +216,11 @@ impl Layout {
         };
         let block = &above[(0..above.len()).rev().take_while(fits).last().unwrap_or(above.len())..];
         let candidates: Vec<&HeadLine> = block.iter().filter(|line| looks_like_names(&line.fields)).collect();
-        let units = candidates.iter().find(|line| looks_like_units(&line.fields)).filter(|_| candidates.len() > 1);
+        // Below names a line with one unit is one of units: a word of it that is none is refused as that of its column.
+        let mut below = candidates.iter().skip(1);
+        let units = below.find(|line| units_of(&line.fields).any(|known| known));
+        let above = candidates.first().filter(|line| candidates.len() > 1 && units_of(&line.fields).all(|known| known));
+        let units = units.or(above);
         let units_line = units.map_or(0, |line| line.number);
         // Names differ from one another; a line that has one word for all columns is something else.
         let distinct =
@@ -399,11 +403,10 @@ pub(super) fn looks_like_names(fields: &[String]) -> bool {
     !fields.iter().any(number) && fields.iter().any(|field| field.chars().any(char::is_alphabetic))
 }
 
-/// Whether fields are units.
-fn looks_like_units(fields: &[String]) -> bool {
-    let mut words = fields.iter().map(|field| unit_word(field)).filter(|word| !word.is_empty()).peekable();
-    let known = |word: &str| Unit::written(word).is_some() || ["-", "1", "rpm", "deg/s", "rad/s", "%"].contains(&word);
-    words.peek().is_some() && words.all(known)
+/// Whether each of the fields that has a word is a unit.
+fn units_of(fields: &[String]) -> impl Iterator<Item = bool> {
+    let words = fields.iter().map(|field| unit_word(field)).filter(|word| !word.is_empty());
+    words.map(|word| Unit::written(word).is_some() || ["-", "1", "rpm", "deg/s", "rad/s", "%"].contains(&word))
 }
 
 /// A unit without the brackets around it.

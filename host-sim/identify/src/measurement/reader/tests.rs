@@ -527,3 +527,10 @@ fn files_of_strangers_are_read_right_or_refused_in_the_same_words() {
     }
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n\n"));
 }
+
+#[test]
+fn a_word_that_is_no_unit_among_units_is_refused_as_that_of_its_column() {
+    let file = b"Zeit;Motor;Abtrieb;Moment\ns;Grad;Grad;Nm\n0,0;1,5;0,1;0,5\n0,1;2,5;0,2;0,5\n";
+    let refused = read(file, "generator=Motor,output=Abtrieb").unwrap_err();
+    assert!(refused.contains("column Motor: found the unit \"Grad\""), "{refused}");
+}
