@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 
 use super::candidate::geometry::Angle;
 use super::channels::waves;
-use super::flank_lag::{behind, flank_lag};
 use super::rows::Rows;
 use crate::calibrate::{SAME_TORQUE, TURNS_WITH_THE_OUTPUT};
 use crate::least_squares::FreeSpan;
@@ -146,11 +145,12 @@ pub(crate) struct Base {
 pub const BETWEEN_READINGS: &str = "time between the readings";
 /// What floats as a load that goes with the angle of the output leaves open whose a wave of the output is.
 pub const WAVE_OF_LOAD: &str = "wave of the output under its load";
-/// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as
-/// this time says. Beside the lag that the rows tell best (`flank_lag`) it is that lag to first order.
+/// What floats as the output takes a time to go to its other flank, s: by each of [`FLANK_S`] as much of a lag, which
+/// together are its mean.
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
-/// The output goes from one flank to the other in some milliseconds. *Guess*.
-pub(super) const FLANK_S: f64 = 5e-3;
+/// The output goes from one flank to the other with lags of which some of these make any, s. *Guess*: a load behind a
+/// clearance takes some milliseconds, and what takes longer than these swings.
+const FLANK_S: [f64; 4] = [5e-3, 10e-3, 20e-3, 40e-3];
 /// Spread of the drag of an output, of the load, where the nominal model states no friction. *Source*: what starts a
 /// drive of the catalogue (CSG-14 to 25, 100), through the ratio, is 7 to 21 % of its rated torque.
 const DRAG_OF_LOAD: f64 = 0.1;
@@ -174,7 +174,7 @@ const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction. *Guess*: friction of a unit is known to a
 /// quarter.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
-/// A clearance is crossed within this time, s. *Guess*: many times the 5 ms of [`FLANK_S`].
+/// A clearance is crossed within this time, s. *Guess*: twice the longest of [`FLANK_S`].
 const CROSSING_S: f64 = 0.08;
 /// A clearance may be this many times as wide as the nominal one before anything else is known. *Guess*: wear and
 /// tolerances rarely add more than half.
@@ -235,11 +235,11 @@ impl Base {
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         // No output is on its other flank at once.
         if rows.recorded.time {
-            let left: Vec<f64> =
-                rows.error.iter().zip(&prediction).map(|(error, predicted)| error - predicted).collect();
-            let lag_s = flank_lag(rows, &left, &flank, half_backlash);
-            let per_s = behind(rows, &flank, half_backlash, lag_s).into_iter().map(|arcsec| arcsec / lag_s);
-            add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
+            for lag_s in FLANK_S {
+                let reached = rows.lagged(&flank, lag_s, false).into_iter().zip(&flank);
+                let per_s = reached.map(|(reached, flank)| half_backlash * (reached - flank) / lag_s);
+                add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
+            }
         }
         // Nor does a catalogue print the drag of the output, which winds a drive up against its motion: by as much
         // under every load, as lost motion is.

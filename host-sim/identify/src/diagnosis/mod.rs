@@ -20,7 +20,6 @@ pub(crate) mod channels;
 mod experiment;
 pub mod explain;
 mod extended;
-mod flank_lag;
 mod hanging;
 mod held_out;
 pub(crate) mod model;

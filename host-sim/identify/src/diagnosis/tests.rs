@@ -175,12 +175,13 @@ fn an_output_behind_a_low_pass_is_read_late_and_has_no_drag() {
 #[test]
 fn an_output_that_takes_milliseconds_to_its_other_flank_is_a_perfect_drive() {
     let nominal = catalogue_drive();
-    for lag_s in [2e-3, 5e-3, 10e-3, 20e-3] {
+    for lag_s in [2e-3, 5e-3, 10e-3, 20e-3, 40e-3] {
         let sessions = slow_to_its_other_flank(&nominal, lag_s);
         let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap().0;
         assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{lag_s}: {}", diagnosis.text());
-        let said = diagnosis.recalibrated[super::base::CHANGE_OF_FLANK];
-        assert!((said.value - lag_s).abs() < 3.0 * said.std + 0.3 * lag_s, "{said:?} for {lag_s}");
+        let said = diagnosis.recalibrated.iter().filter(|(name, _)| name.starts_with(super::base::CHANGE_OF_FLANK));
+        let said: f64 = said.map(|(_, of)| of.value).sum();
+        assert!((said - lag_s).abs() < 1e-3, "{said} for {lag_s}");
     }
 }
 
