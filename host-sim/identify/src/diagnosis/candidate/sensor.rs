@@ -96,20 +96,19 @@ fn sensor_latency() -> Law {
     let mut law = Law::new(CauseName::SensorLatency, |on, _| {
         let per_s = flexspline_base::units::ARCSEC_PER_RAD / on.nominal.ratio;
         let begun = on.scales.begin_s + 0.5 * on.scales.duration_s;
-        let behind = |values: &[f64]| rate(on, values).into_iter().map(|by| -by).collect::<Vec<f64>>();
         // Without changes of the flank, which take a time of their own.
         let of_angle =
             by_row(on, |k| on.base.prediction[k] - on.base.half_backlash * on.base.flank[k] - on.base.wind_up[k]);
+        let (waves, wind_up) = (rate(on, &of_angle), rate(on, &on.base.wind_up));
         let since = |k: usize| 2.0 * (on.rows.time[k] - begun) / on.scales.duration_s.max(1e-9);
         vec![
-            main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Tag::SIZE),
-            // Two clocks seldom run at the same rate.
-            nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
             // The error is that of the instant at which the output was read: its waves are where the generator was
             // then, …
-            nuisance(behind(&of_angle), 1.0),
+            main(by_row(on, |k| -on.rows.speed[k] * per_s - waves[k]), DELAY_S).called(Tag::SIZE),
+            // Two clocks seldom run at the same rate.
+            nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
             // … and so is its wind-up, if it is the output that is read early, and not the generator; …
-            nuisance(behind(&on.base.wind_up), 1.0),
+            nuisance(by_row(on, |k| -wind_up[k]), 1.0),
             // … a motor that gathers speed was slower then.
             nuisance(rate(on, &on.rows.speed).into_iter().map(|by| 0.5 * by * per_s).collect(), DELAY_S),
         ]
