@@ -16,11 +16,13 @@ use serde::{Deserialize, Serialize};
 use super::candidate::geometry::Angle;
 use super::channels::waves;
 use super::rows::Rows;
+use super::select::less;
 use crate::calibrate::{SAME_TORQUE, TURNS_WITH_THE_OUTPUT};
 use crate::least_squares::FreeSpan;
 use crate::misfit::{about_mean, correlation};
 use crate::nominal::{Nominal, UNSTATED};
 use crate::replay::by_core;
+use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 table! {
@@ -242,11 +244,22 @@ impl Base {
             }
         }
         // Nor does a catalogue print the drag of the output, which winds a drive up against its motion: by as much
-        // under every load, as lost motion is.
-        let against = |way: &f64| -way * nominal.ratio.signum() * nominal.slope_arcsec(0.0);
-        let stated = nominal.teeth.is_some() && nominal.friction_torque_n_m > 0.0;
-        let unknown_n_m = if stated { 0.0 } else { DRAG_OF_LOAD * rows.load_scale() };
-        add("drag", rows.direction.iter().map(against).collect(), unknown_n_m);
+        // under every load, as lost motion is. Of a friction that is stated the rows say whether it does.
+        let winds = -nominal.ratio.signum() * nominal.slope_arcsec(0.0);
+        let against: Vec<f64> = rows.direction.iter().map(|way| winds * way).collect();
+        let stated_n_m = nominal.friction_torque_n_m;
+        let drag_n_m = if nominal.teeth.is_none() || stated_n_m == 0.0 {
+            DRAG_OF_LOAD * rows.load_scale()
+        } else {
+            let of = |column: &[f64]| -> Vec<f64> { used.iter().map(|k| column[*k]).collect() };
+            let free = of_any_drive(rows, &used);
+            let loaded = free.beyond([of(&wind_up), of(&flank)]);
+            let freed = |column: &[f64]| loaded.freed(free.freed(of(column)));
+            let (left, drag) = (freed(&less(&rows.error, &prediction)), freed(&against));
+            let fewer = stated_n_m * (2.0 * dot(&left, &drag) - stated_n_m * dot(&drag, &drag));
+            if fewer > (1.0 - CLEARLY_BETTER) * dot(&left, &left) { stated_n_m } else { 0.0 }
+        };
+        add("drag", against, drag_n_m);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         // Of a spring that nobody has stated nothing says how it hardens, nor, where a load goes with the angle of the
         // output, what of the error is the spring's.
@@ -274,7 +287,7 @@ impl Base {
             let turns = nominal.spread.harmonic_phase_rad.max(LEAST_TURN * nominal.spread.harmonic);
             add("harmonic", wave(std::f64::consts::FRAC_PI_2), turns);
         }
-        let uncertain = uncertain(rows, nominal, law, &flank);
+        let uncertain = uncertain(rows, nominal, (law, &flank), drag_n_m > 0.0);
         Base { prediction, flank, wind_up, half_backlash, law, floating, waves: Waves::default(), uncertain }
     }
 }
@@ -348,11 +361,11 @@ pub(super) fn predicted_by_table(rows: &Rows, torque: &[f64], table: &Table<'_>)
     predicted
 }
 
-fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec<bool> {
+fn uncertain(rows: &Rows, nominal: &Nominal, (law, flank): (PlayLaw, &[f64]), drags: bool) -> Vec<bool> {
     // Where hardly any load says which flank carries, the motion does, or nothing says it but at the beginning.
     // Sessions without a load are set aside as a whole, unless too little is left then.
     let ways: [&dyn Fn() -> Option<Vec<bool>>; 4] = [
-        &|| Some(uncertain_by_load(rows, nominal, flank)),
+        &|| Some(uncertain_by_load(rows, nominal, flank, drags)),
         &|| (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal)),
         &|| Some(uncertain_at_first(rows, nominal, true)),
         &|| Some(uncertain_at_first(rows, nominal, false)),
@@ -398,14 +411,14 @@ pub(super) fn rows_of_crossing(rows: &Rows) -> usize {
 }
 
 /// Rows with a torque around friction, and those while the clearance is crossed.
-fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
+fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64], drags: bool) -> Vec<bool> {
     let near = NEAR_FRICTION * nominal.friction_torque_n_m;
     let mut uncertain: Vec<bool> =
         (0..rows.len()).map(|k| rows.torque[k].abs() <= near || flank[k].abs() < 0.999).collect();
     for session in &rows.sessions {
         for k in session.start + 1..session.end {
-            // Lost motion is crossed where the drive turns.
-            if flank[k] * flank[k - 1] < 0.0 || nominal.teeth.is_none() && rows.direction[k] != rows.direction[k - 1] {
+            // What an output's drag winds up is crossed where the drive turns.
+            if flank[k] * flank[k - 1] < 0.0 || drags && rows.direction[k] != rows.direction[k - 1] {
                 let around = k.saturating_sub(2).max(session.start)..(k + 1 + rows_of_crossing(rows)).min(session.end);
                 uncertain[around].fill(true);
             }

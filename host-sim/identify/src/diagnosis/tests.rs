@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::f64::consts::FRAC_PI_2;
 
 use crate::causes::{CauseName, Kind, ParameterName};
-use crate::measurement::{FaultName, Session};
+use crate::measurement::{FaultName, Session, directions};
 use crate::nominal::{Harmonic, Nominal};
 use crate::synthesize::{DrawnUnit, MotionPlan, Sensors, Sizes, catalogue_drive, parse, synthesize};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -316,6 +316,21 @@ fn with_more_by_speed(mut sessions: Vec<Session>, more: impl Fn(f64, f64) -> f64
         }
     }
     sessions
+}
+
+#[test]
+fn friction_that_is_stated_and_winds_the_drive_up_is_no_discrepancy() {
+    let drive = catalogue_drive();
+    let lag = -drive.ratio.signum() * drive.wind_up_arcsec(drive.friction_torque_n_m) / ARCSEC_PER_RAD;
+    for effects in [&[][..], &["sensor_latency:delay_s=0.002"]] {
+        let mut sessions = recorded(effects, 5, 3000, 100.0, 1.5, 71);
+        for Session { generator_rad, error_rad, .. } in &mut sessions {
+            error_rad.iter_mut().zip(directions(generator_rad)).for_each(|(error, way)| *error += lag * way);
+        }
+        let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
+        assert_eq!(names(&diagnosis).len(), effects.len(), "{}", diagnosis.text());
+        assert_eq!(diagnosis.unexplained, [], "{}", diagnosis.text());
+    }
 }
 
 #[test]
