@@ -24,6 +24,7 @@ use std::process::{Command, Stdio};
 use flexspline_identify::extension::Model;
 use flexspline_mechanics::drive::Drive;
 use flexspline_tests::command::flexspline;
+use flexspline_tests::long;
 
 /// Commands that are not run from a page: how they begin, and why.
 const NOT_RUN: [(&str, &str); 11] = [
@@ -222,14 +223,16 @@ impl Copy {
     }
 }
 
-/// Runs the shell blocks of all pages; `slow` ones too, or those only parsed.
-fn run_pages(slow: bool) {
+/// Blocks that are slow are parsed alone, and run in the long form.
+#[test]
+#[ignore = "long: tests/run slow"]
+fn every_command_of_a_page_runs() {
     let mut wrong = Vec::new();
     for page in pages().iter().filter(|page| page.shell().next().is_some()) {
         let [copy, parser] = [false, true].map(Copy::new);
         for block in page.shell().filter(|block| !PARTS.contains(&block.mark.as_str())) {
             let clock = std::time::Instant::now();
-            let desk = if block.mark == "slow" && !slow { &parser } else { &copy };
+            let desk = if block.mark == "slow" && !long() { &parser } else { &copy };
             if let Err(error) = commands(&block.text).and_then(|commands| desk.run(&commands)) {
                 wrong.push(format!("{}: {error}", page.at(block.line)));
             }
@@ -237,12 +240,6 @@ fn run_pages(slow: bool) {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
-}
-
-#[test]
-#[ignore = "long: tests/run slow"]
-fn every_command_of_a_page_runs() {
-    run_pages(false);
 }
 
 /// The first commands that the README gives to each reader run as they stand after its block: they are spans in a
@@ -265,12 +262,6 @@ fn first_commands_of_the_readme_run() {
         ran += 1;
     }
     assert_eq!(ran, 6);
-}
-
-#[test]
-#[ignore = "minutes: the slow commands too"]
-fn slow_commands_run_too() {
-    run_pages(true);
 }
 
 /// `tests/run` with its parts.

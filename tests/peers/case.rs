@@ -43,8 +43,6 @@ pub struct Case {
     pub increments: usize,
     /// Size of each, rad.
     pub step_rad: f64,
-    /// Parts that CalculiX is made to take each of them in.
-    pub parts: usize,
     /// Contact penalties on bore and flanks, N/mm³, the same in both programs.
     pub penalties: [f64; 2],
 }
@@ -102,9 +100,8 @@ impl Comparison {
 impl Case {
     /// A name for its folder and its lines.
     pub fn name(&self) -> String {
-        let parts = if self.parts > 1 { format!("-in-{}", self.parts) } else { String::new() };
         let teeth = self.teeth.map_or(String::new(), |teeth| format!("{teeth}-teeth-"));
-        format!("{teeth}{}-{}{parts}", self.generator, self.mesh)
+        format!("{teeth}{}-{}", self.generator, self.mesh)
     }
 
     /// The drive of both programs.
@@ -148,13 +145,6 @@ impl Case {
         let limits = Limits { cpu_s: 60.0, memory_mb: 4000.0 };
         run(&mut command, &folder.join("export.log"), None, limits)?;
         let deck = folder.join(format!("{}.inp", self.generator));
-        if self.parts > 1 {
-            let text = std::fs::read_to_string(&deck).map_err(|error| error.to_string())?;
-            let (start, rotation) = text.split_once("** step 4:").ok_or("the deck has no rotation step")?;
-            let part = format!("*STATIC\n{}, 1.\n", 1.0 / self.parts as f64);
-            let text = format!("{start}** step 4:{}", rotation.replace("*STATIC\n1., 1.\n", &part));
-            std::fs::write(&deck, text).map_err(|error| error.to_string())?;
-        }
         Ok(deck)
     }
 

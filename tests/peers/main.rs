@@ -4,11 +4,10 @@
 //! our solvers goes the same way on the same mesh: deformed, loaded, turned in increments, and at the end brought to
 //! another load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the
 //! stress along it, and what both cost. The short form is a small drive with the cam on the coarse mesh; `--long` adds
-//! HHD-95, its standard mesh and what CalculiX itself leaves open (each increment in two parts). A cup and a closed
-//! sleeve in solid elements stand beside our shells, a fine mesh of one root fillet beside the stress that
-//! `simulate --stress` reports. A tooth slid along its space with friction stands beside our flank contact. Teeth that
-//! lean along their face are solved in three dimensions and by our slices. Rollers are not compared: see the header of
-//! `export/inp.rs`.
+//! HHD-95 and its standard mesh. A cup and a closed sleeve in solid elements stand beside our shells, a fine mesh of
+//! one root fillet beside the stress that `simulate --stress` reports. A tooth slid along its space with friction
+//! stands beside our flank contact. Teeth that lean along their face are solved in three dimensions and by our slices.
+//! Rollers are not compared: see the header of `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 
@@ -28,7 +27,7 @@ use clap::Parser;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
 
-use case::{Case, Comparison, Peer};
+use case::{Case, Comparison};
 use flexspline_mechanics::stepping::Method;
 use ours::SOLVERS;
 use program::Limits;
@@ -59,7 +58,7 @@ const LARGE: usize = 60_000;
 /// Run CalculiX and flexspline on the same deck and compare them
 #[derive(Debug, Parser)]
 struct Options {
-    /// Standard mesh and CalculiX's own scatter too
+    /// HHD-95 on both meshes too
     #[arg(long)]
     long: bool,
     /// Only this case, by its name; "root" for the root fillets, "friction" for the sliding tooth, "slices" for leaning
@@ -117,7 +116,6 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         last_torque_n_m: 25.0,
         increments: 2,
         step_rad: 0.01,
-        parts: 1,
         penalties: PENALTIES,
     };
     // An increment of CalculiX takes more than a minute for HHD-95: the short form turns a drive of half of its
@@ -128,7 +126,6 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
     if options.long || options.case.is_some() {
         cases.push(hhd_95);
         cases.push(Case { mesh: MeshLevel::Standard, ..hhd_95 });
-        cases.push(Case { parts: 2, ..hhd_95 });
     }
     if options.case.as_deref() == Some("root") {
         return root::fillets(&options.ccx, &options.out, claims);
@@ -153,26 +150,14 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         lines.push(friction::friction(&options.ccx, &options.out, claims)?);
         lines.push(slices::slices(&options.ccx, &options.out, options.long, claims)?);
     }
-    let mut whole: Option<Vec<f64>> = None;
     for case in cases {
-        let (line, peer) = beside(&case, options, &flexspline, claims)?;
-        lines.push(line);
-        if case == hhd_95 {
-            whole = Some(peer.output_rad);
-        } else if case.parts > 1
-            && let Some(whole) = &whole
-        {
-            let scatter = whole.iter().zip(&peer.output_rad).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            let scatter = scatter.to_degrees() * 3600.0;
-            println!("  increments in {} parts move CalculiX's own output by {scatter:.3}\"", case.parts);
-            lines.push(format!("CalculiX's own scatter {scatter:.3}\""));
-        }
+        lines.push(beside(&case, options, &flexspline, claims)?);
     }
     Ok(lines.join("; "))
 }
 
 /// One case: everything that is printed and claimed about it, and its part of the last line.
-fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims) -> Result<(String, Peer), String> {
+fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims) -> Result<String, String> {
     let folder = options.out.join(case.name());
     let unknowns = case.problem(Method::Reference)?.degrees_of_freedom();
     println!("== {} at {} N·m, {unknowns} dof", case.name(), case.torque_n_m);
@@ -220,7 +205,7 @@ fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims
         costs.join(", "),
         memory.join(", ")
     );
-    Ok((line, peer))
+    Ok(line)
 }
 
 fn report(ours: &Comparison, ratio: f64) {

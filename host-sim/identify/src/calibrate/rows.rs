@@ -374,16 +374,15 @@ impl Rows {
             }
             columns
         };
-        // A flank that changes is none, or one that friction lets go.
+        // A flank that changes is none, or one that friction lets go: neither lies among the rows about a step.
         let flank = |row: &Row| flank(&row.at, model.scales.friction_n_m);
         let held_n_m = HELD * self.loads.iter().fold(0.0, |most: f64, (_, load)| most.max(load.abs()));
-        let held = |w: &[Row]| w.iter().all(|row| row.at.torque_n_m.abs() >= held_n_m);
-        let stays = |w: &&[Row]| held(w) && w[0].at.way == w[1].at.way && flank(&w[0]) == flank(&w[1]);
+        let hold = |row: &Row| (session(row), row.at.way, flank(row), row.at.torque_n_m.abs() >= held_n_m);
         let mut ends = vec![0; logs];
         self.rows.iter().for_each(|row| ends[row.at.log] = place(row) + 1);
-        let places = self.rows.chunk_by(|a, b| session(a) == session(b)).flat_map(|rows| {
-            let of = place(&rows[0])..ends[rows[0].at.log];
-            rows.windows(2).filter(stays).map(move |w| (place(&w[1]), of.clone()))
+        let places = self.rows.chunk_by(|a, b| hold(a) == hold(b)).filter(|rows| hold(&rows[0]).3).flat_map(|rows| {
+            let (of, end) = (place(&rows[0])..place(&rows[rows.len() - 1]) + 1, ends[rows[0].at.log]);
+            rows[1..].iter().map(move |row| (place(row)..end, of.clone()))
         });
         let in_order: Vec<f64> = left.iter().flatten().copied().collect();
         let (at, size) = lasting_step(&left, columns, places, (white_noise([in_order.as_slice()]), 0.0))?;

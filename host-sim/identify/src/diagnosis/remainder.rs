@@ -102,8 +102,8 @@ pub(crate) fn step(
         before.is_some_and(|before| on.base.flank[before].signum() == on.base.flank[*k].signum())
     };
     let inside = rows.sessions_used().flat_map(|session| {
-        let from = session.start;
-        session.skip(1).filter(|k| left[*k].is_some()).filter(follows).map(move |k| (k, from..rows.len()))
+        let of = session.clone();
+        session.skip(1).filter(|k| left[*k].is_some()).filter(follows).map(move |k| (k..rows.len(), of.clone()))
     });
     let (row, _) = lasting_step(&left, || columns(problem, selected), inside, (white, unknown))?;
     let number = rows.sessions.iter().position(|session| session.contains(&row))?;

@@ -76,12 +76,12 @@ const LASTS: f64 = 8.0;
 const MOST_GOES_ON: f64 = 0.98;
 
 /// The first row behind a step within one row that takes most of what a fit of `columns` leaves of successive rows,
-/// `None` of one that does not count, and its size, close by. `places` are looked at, each a row with those that have
-/// one zero: the step stays to their end. It is larger than `least`, and than noise makes of which `white` is white.
+/// `None` of one that does not count, and its size, close by. `places` are looked at: the rows to which each step
+/// stays, and those about it that nothing else parts. It is larger than `least` and noise, of which `white` is white.
 pub(crate) fn lasting_step(
     left: &[Option<f64>],
     columns: impl FnOnce() -> Vec<Vec<f64>>,
-    places: impl Iterator<Item = (usize, Range<usize>)>,
+    places: impl Iterator<Item = (Range<usize>, Range<usize>)>,
     (white, least): (f64, f64),
 ) -> Option<(usize, f64)> {
     // Close by, where no smooth column follows: change from row to row, and of the mean.
@@ -94,16 +94,16 @@ pub(crate) fn lasting_step(
         let enough = behind.len().min(before.len()) >= BESIDE_A_STEP / 2;
         enough.then(|| (jump, mean(&behind) - mean(&before)))
     };
-    let near = |(row, of): (usize, Range<usize>)| {
-        let (jump, near) = beside(left, row, &of)?;
+    let near = |(stays, of): (Range<usize>, Range<usize>)| {
+        let (jump, near) = beside(left, stays.start, &of)?;
         let sharp = (jump - near).abs() < AGREES * near.abs() + 4.0 * white;
-        (sharp && near.abs() > (1.0 - AGREES) * least.max(SEEN * white)).then_some((row, of, near))
+        (sharp && near.abs() > (1.0 - AGREES) * least.max(SEEN * white)).then_some((stays, of, near))
     };
-    let mut close_by: Vec<(usize, Range<usize>, f64)> = places.filter_map(near).collect();
+    let mut close_by: Vec<(Range<usize>, Range<usize>, f64)> = places.filter_map(near).collect();
     close_by.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-    let mut apart: Vec<(usize, Range<usize>, f64)> = Vec::new();
+    let mut apart: Vec<(Range<usize>, Range<usize>, f64)> = Vec::new();
     for step in close_by {
-        if apart.len() < MOST_PLACES && apart.iter().all(|other| other.0.abs_diff(step.0) >= BESIDE_A_STEP) {
+        if apart.len() < MOST_PLACES && apart.iter().all(|of| of.0.start.abs_diff(step.0.start) >= BESIDE_A_STEP) {
             apart.push(step);
         }
     }
@@ -115,14 +115,14 @@ pub(crate) fn lasting_step(
     };
     let span = FreeSpan::default().beyond(columns().into_iter().map(counting));
     let freed = span.freed(left.iter().map(|left| left.unwrap_or(0.0)).collect());
-    let step = |(row, of, near): &(usize, Range<usize>, f64)| {
-        let of_step = (0..left.len()).map(|k| f64::from(u8::from((*row..of.end).contains(&k)))).collect();
+    let step = |(rows, of, near): &(Range<usize>, Range<usize>, f64)| {
+        let of_step = (0..left.len()).map(|k| f64::from(u8::from(rows.contains(&k)))).collect();
         let of_step = span.freed(counting(of_step));
         let square = dot(&of_step, &of_step);
         let size = dot(&of_step, &freed) / square;
         let stays = (OF_NEAR..=1.0 / OF_NEAR).contains(&(size / near)) && size.abs() > least.max(SEEN * white);
         let is_one = stays && 2.0 * square >= BESIDE_A_STEP as f64;
-        is_one.then_some((size * size * square, (*row, of.clone()), size, of_step))
+        is_one.then_some((size * size * square, (rows.start, of.clone()), size, of_step))
     };
     let found = apart.iter().filter_map(step);
     let (gain, (row, of), size, of_step) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
