@@ -78,7 +78,7 @@ fn tracking(flight: &Flight, results: &Results) -> PageSection {
         ]
     };
     let caption = "Output less target; speed of the output less the target's while that is even; time after a slew \
-                   until it stays within 2″";
+                   until it stays within 2″ of the target";
     let header = ["Controller", "rms", "largest", "velocity ripple", "settles"];
     let table = PageBlock::table(caption, &header, CONTROLLERS.iter().enumerate().map(row).collect());
     let over_time = |id, title, caption, y, column: usize| {

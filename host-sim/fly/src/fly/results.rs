@@ -12,13 +12,13 @@ use flexspline_base::figures::NamedFigure;
 
 use super::file::name_of;
 
-/// A time to settle for a reader; an output that was settled all along never left.
+/// A time to settle for a reader.
 #[must_use]
 pub fn settles_in(seconds: f64) -> String {
-    if seconds == 0.0 { "never left".to_owned() } else { format!("{seconds:.2} s") }
+    if seconds.is_finite() { format!("{seconds:.2} s") } else { "never".to_owned() }
 }
 
-/// Output less target within this of where it ends counts as settled, arcsec.
+/// Output less target within this counts as settled, arcsec.
 const SETTLED_ARCSEC: f64 = 2.0;
 /// Least phase margin, degrees, and least distance of the open loop from −1 of a servo that is sound: the lower ends
 /// of what K. J. Åström and R. M. Murray call reasonable (Feedback Systems, 2nd ed. 2021, section 10.3: 30° to 60°,
@@ -79,8 +79,8 @@ pub struct Results {
     pub velocity_ripple_floor: f64,
     /// Torque in the mesh, N·m, largest.
     pub mesh_n_m: ByController<f64>,
-    /// From the end of a slew until the output stays within 2″ of where it comes to rest, s, mean; none if the scenario
-    /// never stands.
+    /// From the end of a slew until the output stays within 2″ of the target, s, mean, infinite where one ends beyond
+    /// them; none if the scenario never stands.
     pub settle_s: Option<ByController<f64>>,
     /// Share of what the ideal removes that the core removes; none where the ideal removes next to nothing.
     pub removed: Option<f64>,
@@ -310,9 +310,9 @@ fn settle_s(scenario: &Scenario, flown: &Flown) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for [from, to] in stands(scenario) {
         let stretch = &flown.errors[index(from)..index(to)];
-        let Some(last) = stretch.last() else { continue };
-        let outside = stretch.iter().rposition(|error| f64::from((error - last).abs()) > SETTLED_ARCSEC);
-        sum += outside.map_or(0.0, |at| (at + 1) as f64 * tick_s);
+        let outside = stretch.iter().rposition(|error| f64::from(error.abs()) > SETTLED_ARCSEC);
+        let never = outside.is_some_and(|at| at + 1 == stretch.len());
+        sum += if never { f64::INFINITY } else { outside.map_or(0.0, |at| (at + 1) as f64 * tick_s) };
         count += 1.0;
     }
     if count > 0.0 { sum / count } else { 0.0 }
