@@ -263,7 +263,7 @@ fn misspelt_names_get_a_suggestion_and_garbage_gets_none() {
         ("synthesize --effect sunspots", None),
         ("diagnose data.csv --model nominal.toml", Some("generater_rad")),
         ("diagnose data.csv --model nominal.toml --columns genrator=a:rad", Some("generator")),
-        ("diagnose data.csv --model nominal.toml --columns generator=a:degrees", Some("deg")),
+        ("diagnose data.csv --model nominal.toml --columns generator=a:degs", Some("deg")),
         ("diagnose data.csv --model nominal.toml --columns generator=a:furlong", None),
         ("diagnose data.csv --model wrong.toml", Some("nominal.backlash_arcsec")),
         ("simulate --generator cam --path short.csv", Some("torque_n_m")),
