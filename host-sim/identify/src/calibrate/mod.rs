@@ -585,15 +585,15 @@ fn at_lost_index(
         return None;
     }
     let Fitted { rows, folds, model, .. } = fitted.as_ref().ok()?;
-    let (log, line, size_arcsec) = rows.lost_index(model, folds.parts.clone())?;
+    let (log, lost) = rows.lost_index(model, folds.parts.clone())?;
     let mut parted = given.to_vec();
     let file = parted.iter_mut().find(|file| file.file == files[log].file)?;
-    part(file, line, size_arcsec, prior)?;
+    part(file, lost, prior)?;
     Some(parted)
 }
 
-/// Gives a log another zero from a line on, where an encoder lost its index.
-fn part(log: &mut Recording, line: u64, size_arcsec: f64, prior: &Prior<'_>) -> Option<()> {
+/// Gives a log another zero from a line on, where an encoder lost its index, to the end or to that of the session.
+fn part(log: &mut Recording, (line, size_arcsec, again): (u64, f64, bool), prior: &Prior<'_>) -> Option<()> {
     let at = |session: &Session| session.line.iter().position(|of| *of == line);
     let (place, row) = log.sessions.iter().enumerate().find_map(|(k, session)| Some((k, at(session)?)))?;
     let whole = &log.sessions[place];
@@ -604,6 +604,7 @@ fn part(log: &mut Recording, line: u64, size_arcsec: f64, prior: &Prior<'_>) -> 
     log.faults.push(Fault::lost_index(whole, row, size_arcsec, &then));
     let before = whole.part(0..row);
     log.sessions.splice(place..=place, [before, behind]);
+    log.sessions.get_mut(place + 2).into_iter().for_each(|next| next.own_zero |= again);
     Some(())
 }
 
@@ -664,8 +665,8 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         let recorded = Recorded::of(&files, &prior);
         let rows = settled(&files, &prior, &recorded).sure(recorded.scales.friction_n_m, &recorded);
         let none = Model { chosen: Vec::new(), coefficients: Vec::new(), scales: recorded.scales };
-        let Some((_, line, size)) = rows.lost_index(&none, recorded.shown(PartName::ALL, &prior)) else { break };
-        part(&mut log, line, size, &prior);
+        let Some((_, lost)) = rows.lost_index(&none, recorded.shown(PartName::ALL, &prior)) else { break };
+        part(&mut log, lost, &prior);
     }
     if set_anew(std::slice::from_ref(&log), &prior).is_some() {
         log.sessions.iter_mut().for_each(|session| session.own_zero = true);

@@ -354,8 +354,9 @@ impl Rows {
     }
 
     /// Where an encoder lost its index, in what a model leaves, beside all `parts` that may be there and a delay of
-    /// each log: the log, the line from which on the error has another zero, and how far that is off, arcsec.
-    pub(crate) fn lost_index(&self, model: &Model, mut parts: Vec<PartName>) -> Option<(usize, u64, f64)> {
+    /// each log: the log, the line from which on the error has another zero, how far that is off, arcsec, and whether
+    /// it has the one before again from the next session on.
+    pub(crate) fn lost_index(&self, model: &Model, mut parts: Vec<PartName>) -> Option<(usize, (u64, f64, bool))> {
         let logs = self.means_arcsec.len();
         parts.extend((0..logs).map(PartName::ReadingDelay));
         // Rows that do not count, and the end of a session, keep those beside them apart.
@@ -378,16 +379,22 @@ impl Rows {
         let flank = |row: &Row| flank(&row.at, model.scales.friction_n_m);
         let held_n_m = HELD * self.loads.iter().fold(0.0, |most: f64, (_, load)| most.max(load.abs()));
         let hold = |row: &Row| (session(row), row.at.way, flank(row), row.at.torque_n_m.abs() >= held_n_m);
-        let mut ends = vec![0; logs];
-        self.rows.iter().for_each(|row| ends[row.at.log] = place(row) + 1);
+        let (mut ends, mut ends_of_sessions) = (vec![0; logs], vec![0; session(self.rows.last()?) + 1]);
+        for row in &self.rows {
+            ends[row.at.log] = place(row) + 1;
+            ends_of_sessions[session(row)] = place(row) + 1;
+        }
         let places = self.rows.chunk_by(|a, b| hold(a) == hold(b)).filter(|rows| hold(&rows[0]).3).flat_map(|rows| {
-            let (of, end) = (place(&rows[0])..place(&rows[rows.len() - 1]) + 1, ends[rows[0].at.log]);
-            rows[1..].iter().map(move |row| (place(row)..end, of.clone()))
+            let of = place(&rows[0])..place(&rows[rows.len() - 1]) + 1;
+            let mut to = vec![ends[rows[0].at.log], ends_of_sessions[session(&rows[0])]];
+            to.dedup();
+            let steps = rows[1..].iter().map(place).flat_map(move |row| to.clone().into_iter().map(move |to| row..to));
+            steps.map(move |rows| (rows, of.clone()))
         });
         let in_order: Vec<f64> = left.iter().flatten().copied().collect();
         let (at, size) = lasting_step(&left, columns, places, (white_noise([in_order.as_slice()]), 0.0))?;
-        let row = self.rows.iter().find(|row| place(row) == at)?;
-        Some((row.at.log, row.line, size))
+        let row = self.rows.iter().find(|row| place(row) == at.start)?;
+        Some((row.at.log, (row.line, size, at.end < ends[row.at.log])))
     }
 
     /// Those of some logs.

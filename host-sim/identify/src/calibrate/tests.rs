@@ -269,6 +269,24 @@ fn sessions_that_were_set_to_zero_anew_have_zeros_of_their_own() {
     }
 }
 
+/// Set to its mark again before the next session.
+#[test]
+fn an_index_that_is_lost_to_the_end_of_a_session_costs_a_table_nothing() {
+    let law = |psi: f64, _: f64, torque: f64, way: f64| 20.0 * (2.0 * psi).sin() + 1.5 * torque - 12.0 * way;
+    let mut log = recording(1, law);
+    let session = |seed: u64| {
+        let mut session = recording(seed, law).sessions.remove(0);
+        session.line.iter_mut().for_each(|line| *line += 10_000 * seed);
+        session
+    };
+    log.sessions = (1..5).map(session).collect();
+    log.sessions[1].error_rad[1500..].iter_mut().for_each(|error| *error += 60.0 / ARCSEC_PER_RAD);
+    let calibration = calibrate(&[log], &by_ratio()).unwrap().calibration;
+    let [lost] = &calibration.data_faults[..] else { panic!("{:?}", calibration.data_faults) };
+    assert_eq!((lost.name, lost.first_line), (FaultName::EncoderIndexJump, 21_500));
+    assert!(calibration.held_out.rms_after_arcsec < 2.5, "{:?}", calibration.held_out);
+}
+
 /// Logs at one load each, and each with a zero that is free, say nothing of the wind-up.
 #[test]
 fn logs_of_one_load_each_make_no_wind_up() {

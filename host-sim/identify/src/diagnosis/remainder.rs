@@ -105,7 +105,7 @@ pub(crate) fn step(
         let of = session.clone();
         session.skip(1).filter(|k| left[*k].is_some()).filter(follows).map(move |k| (k..rows.len(), of.clone()))
     });
-    let (row, _) = lasting_step(&left, || columns(problem, selected), inside, (white, unknown))?;
+    let row = lasting_step(&left, || columns(problem, selected), inside, (white, unknown))?.0.start;
     let number = rows.sessions.iter().position(|session| session.contains(&row))?;
     Some((number, rows.since[row]))
 }

@@ -75,15 +75,15 @@ const LASTS: f64 = 8.0;
 /// Correlation of successive rows, at most. *Guess*: a hundredth of them counts.
 const MOST_GOES_ON: f64 = 0.98;
 
-/// The first row behind a step within one row that takes most of what a fit of `columns` leaves of successive rows,
-/// `None` of one that does not count, and its size, close by. `places` are looked at: the rows to which each step
+/// The rows behind a step within one row that takes most of what a fit of `columns` leaves of successive rows, `None` of
+/// one that does not count, to where it stays, and its size, close by. `places` are looked at: the rows to which each step
 /// stays, and those about it that nothing else parts. It is larger than `least` and noise, of which `white` is white.
 pub(crate) fn lasting_step(
     left: &[Option<f64>],
     columns: impl FnOnce() -> Vec<Vec<f64>>,
     places: impl Iterator<Item = (Range<usize>, Range<usize>)>,
     (white, least): (f64, f64),
-) -> Option<(usize, f64)> {
+) -> Option<(Range<usize>, f64)> {
     // Close by, where no smooth column follows: change from row to row, and of the mean.
     let beside = |left: &[Option<f64>], row: usize, of: &Range<usize>| {
         let behind = left[row..of.end.min(row + CLOSE_BY)].iter().flatten();
@@ -103,7 +103,8 @@ pub(crate) fn lasting_step(
     close_by.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
     let mut apart: Vec<(Range<usize>, Range<usize>, f64)> = Vec::new();
     for step in close_by {
-        if apart.len() < MOST_PLACES && apart.iter().all(|of| of.0.start.abs_diff(step.0.start) >= BESIDE_A_STEP) {
+        let other = |of: usize| of == step.0.start || of.abs_diff(step.0.start) >= BESIDE_A_STEP;
+        if apart.len() < MOST_PLACES && apart.iter().all(|of| other(of.0.start)) {
             apart.push(step);
         }
     }
@@ -122,10 +123,10 @@ pub(crate) fn lasting_step(
         let size = dot(&of_step, &freed) / square;
         let stays = (OF_NEAR..=1.0 / OF_NEAR).contains(&(size / near)) && size.abs() > least.max(SEEN * white);
         let is_one = stays && 2.0 * square >= BESIDE_A_STEP as f64;
-        is_one.then_some((size * size * square, (rows.start, of.clone()), size, of_step))
+        is_one.then_some((size * size * square, (rows.clone(), of.clone()), size, of_step))
     };
     let found = apart.iter().filter_map(step);
-    let (gain, (row, of), size, of_step) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (gain, (rows, of), size, of_step) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
     // What is left besides is worth fewer rows where it goes on from row to row.
     let besides: Vec<f64> = freed.iter().zip(of_step).map(|(freed, of_step)| freed - size * of_step).collect();
     let (own, next) = (dot(&besides, &besides), dot(&besides[1..], &besides[..besides.len() - 1]));
@@ -133,5 +134,6 @@ pub(crate) fn lasting_step(
     let variance = own / left.iter().flatten().count() as f64 * (1.0 + goes_on) / (1.0 - goes_on);
     let besides: Vec<Option<f64>> =
         besides.into_iter().zip(left).map(|(besides, left)| left.map(|_| besides)).collect();
-    (gain > LASTS * LASTS * variance).then_some((row, size + beside(&besides, row, &of)?.1))
+    let size = size + beside(&besides, rows.start, &of)?.1;
+    (gain > LASTS * LASTS * variance).then_some((rows, size))
 }
