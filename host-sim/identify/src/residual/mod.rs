@@ -75,9 +75,10 @@ const LASTS: f64 = 8.0;
 /// Rows to a batch. *Guess*: eight times those about a step, so that wander is in it.
 const BATCH: usize = 8 * BESIDE_A_STEP;
 
-/// The rows behind a step within one row that takes most of what a fit of `columns` leaves of successive rows, `None` of
-/// one that does not count, to where it stays, and its size, close by. `places` are looked at: the rows to which each step
-/// stays, and those about it that nothing else parts. It is larger than `least` and noise, of which `white` is white.
+/// The rows behind a step within one row that takes most of what a fit of `columns` leaves of successive rows, `None`
+/// of one that does not count, to where it stays, and its size, close by. `places` are looked at: the rows to which
+/// each step stays, and those about it that nothing else parts. It is larger than `least` and noise, of which `white`
+/// is white.
 pub(crate) fn lasting_step(
     left: &[Option<f64>],
     columns: impl FnOnce() -> Vec<Vec<f64>>,
