@@ -147,7 +147,7 @@ pub(crate) struct Base {
 pub const BETWEEN_READINGS: &str = "time between the readings";
 /// What floats as a load that goes with the angle of the output leaves open whose a wave of the output is.
 pub const WAVE_OF_LOAD: &str = "wave of the output under its load";
-/// What floats as the output takes a time to go to its other flank, s: by each of [`FLANK_S`] as much of a lag, which
+/// What floats as the output takes a time to go to its other flank, s: by each of `FLANK_S` as much of a lag, which
 /// together are its mean.
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
 /// The output goes from one flank to the other with lags of which some of these make any, s. *Guess*: a load behind a

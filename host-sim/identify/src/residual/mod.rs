@@ -72,6 +72,8 @@ const MOST_PLACES: usize = 16;
 
 /// It is this many standard deviations. *Guess*: what is left is not all noise, for which five would do.
 const LASTS: f64 = 8.0;
+/// Correlation of successive rows, at most. *Guess*: a hundredth of them counts.
+const MOST_GOES_ON: f64 = 0.98;
 /// Rows to a batch. *Guess*: eight times those about a step, so that wander is in it.
 const BATCH: usize = 8 * BESIDE_A_STEP;
 
@@ -128,11 +130,14 @@ pub(crate) fn lasting_step(
     };
     let found = apart.iter().filter_map(step);
     let (gain, (rows, of), size, of_step) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    // What is left besides is worth fewer rows where it goes on from row to row: by the means of batches (Flegal and
-    // Jones, Ann. Stat. 38, 1034, 2010).
+    // What is left besides is worth fewer rows where it goes on from row to row, by the correlation of successive ones or
+    // by the means of batches (Flegal and Jones, Ann. Stat. 38, 1034, 2010): wander hides below white noise from that,
+    // and in few batches from these.
     let besides: Vec<f64> = freed.iter().zip(of_step).map(|(freed, of_step)| freed - size * of_step).collect();
-    let batches = besides.chunks(BATCH).map(|batch| batch.iter().sum::<f64>().powi(2));
-    let variance = batches.sum::<f64>() / left.iter().flatten().count() as f64;
+    let (own, next) = (dot(&besides, &besides), dot(&besides[1..], &besides[..besides.len() - 1]));
+    let goes_on = if own > 0.0 { (next / own).clamp(0.0, MOST_GOES_ON) } else { 0.0 };
+    let batches = besides.chunks(BATCH).map(|batch| batch.iter().sum::<f64>().powi(2)).sum::<f64>();
+    let variance = batches.max(own * (1.0 + goes_on) / (1.0 - goes_on)) / left.iter().flatten().count() as f64;
     let besides: Vec<Option<f64>> =
         besides.into_iter().zip(left).map(|(besides, left)| left.map(|_| besides)).collect();
     let size = size + beside(&besides, rows.start, &of)?.1;
