@@ -106,8 +106,8 @@ pub(crate) fn lasting_step(
     close_by.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
     let mut apart: Vec<(Range<usize>, Range<usize>, f64)> = Vec::new();
     for step in close_by {
-        let other = |of: usize| of == step.0.start || of.abs_diff(step.0.start) >= BESIDE_A_STEP;
-        if apart.len() < MOST_PLACES && apart.iter().all(|of| other(of.0.start)) {
+        let other = |of: &Range<usize>| of.start == step.0.start || of.start.abs_diff(step.0.start) >= BESIDE_A_STEP;
+        if apart.len() < MOST_PLACES && apart.iter().all(|(of, ..)| other(of)) {
             apart.push(step);
         }
     }
@@ -130,9 +130,9 @@ pub(crate) fn lasting_step(
     };
     let found = apart.iter().filter_map(step);
     let (gain, (rows, of), size, of_step) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    // What is left besides is worth fewer rows where it goes on from row to row, by the correlation of successive ones or
-    // by the means of batches (Flegal and Jones, Ann. Stat. 38, 1034, 2010): wander hides below white noise from that,
-    // and in few batches from these.
+    // What is left besides is worth fewer rows where it goes on from row to row, by the correlation of successive ones
+    // or by the means of batches (Flegal and Jones, Ann. Stat. 38, 1034, 2010): below white noise wander hides from
+    // that, in few batches from these.
     let besides: Vec<f64> = freed.iter().zip(of_step).map(|(freed, of_step)| freed - size * of_step).collect();
     let (own, next) = (dot(&besides, &besides), dot(&besides[1..], &besides[..besides.len() - 1]));
     let goes_on = if own > 0.0 { (next / own).clamp(0.0, MOST_GOES_ON) } else { 0.0 };
