@@ -28,7 +28,8 @@ pub fn series(name: &str) -> Option<&'static str> {
 /// size; none of a series or ratio that is not at hand, or of a size beyond the printed ones.
 pub fn sheet(name: &str, size: f64, ratio: u32) -> Option<Stated> {
     let series = series(name)?;
-    let rows = of_ratio(ratio);
+    let own = usize::from(["CSG", "SHG"].contains(&series));
+    let rows = of_ratio(ratio, own);
     let above = rows.iter().find(|row| row.size >= size)?;
     let below = rows.iter().rfind(|row| row.size <= size)?;
     let of = |size: f64| format!("{series}-{size}-{ratio}");
@@ -44,7 +45,6 @@ pub fn sheet(name: &str, size: f64, ratio: u32) -> Option<Stated> {
         format!("; i = {ratio} is not printed: its stiffness is that of i = {}, as of all from 80 to 160", other.ratio)
     });
     let clone = if name.eq_ignore_ascii_case(series) { "" } else { ", of which this is a clone by its name" };
-    let own = usize::from(["CSG", "SHG"].contains(&series));
     let [t1_n_m, t2_n_m, k1_n_m_per_rad, k2_n_m_per_rad, k3_n_m_per_rad] = row.stiffness.map(Some);
     Some(Stated {
         source: Some(source + clone + &shared),
@@ -64,11 +64,15 @@ pub fn sheet(name: &str, size: f64, ratio: u32) -> Option<Stated> {
 /// What is at hand, in words.
 pub fn sizes_in_words() -> String {
     let sizes = |ratio: u32| {
-        let rows = of_ratio(ratio);
+        let rows = of_ratio(ratio, 0);
         format!("{} to {}", rows[0].size, rows[rows.len() - 1].size)
     };
     let [series, high] = [SERIES.join(", "), HIGH_RATIOS.end().to_string()];
-    format!("{series} of i = 30 (sizes {}), 50 ({}) and 80 to {high} ({})", sizes(30), sizes(50), sizes(80))
+    let [low, from_50, from_80] = [30, 50, 80].map(sizes);
+    format!(
+        "{series} of i = 30 (sizes {low}), 50 ({from_50}) and 80 to {high} ({from_80}), CSG and SHG from size 14 and \
+         i = 50 on"
+    )
 }
 
 /// A line.
@@ -103,11 +107,12 @@ impl SizeRow {
 }
 
 /// Sizes with a ratio, ascending; of one that is not printed but shares its stiffness with others, the stiffness alone.
-fn of_ratio(ratio: u32) -> Vec<SizeRow> {
+/// Of series with `own` torques (1) those alone that have one: they are not made smaller, nor with lower ratios.
+fn of_ratio(ratio: u32, own: usize) -> Vec<SizeRow> {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).comment(Some(b'#')).from_reader(SIZES.as_bytes());
     let mut rows: Vec<SizeRow> = reader.deserialize().collect::<Result<_, _>>().expect("the file is ours");
     let shares = |row: &SizeRow| HIGH_RATIOS.contains(&ratio) && HIGH_RATIOS.contains(&row.ratio);
-    rows.retain(|row| row.ratio == ratio || shares(row));
+    rows.retain(|row| (row.ratio == ratio || shares(row)) && (own == 0 || row.rated_n_m[own].is_some()));
     rows.sort_by(|a, b| a.size.total_cmp(&b.size).then((a.ratio != ratio).cmp(&(b.ratio != ratio))));
     rows.dedup_by_key(|row| row.size);
     rows.into_iter().map(|row| if row.ratio == ratio { row } else { row.stiffness_alone() }).collect()
@@ -151,6 +156,9 @@ mod tests {
             ("CSF", 25.0, 40),
             ("CSG", 25.0, 200),
             ("CSF", 40.0, 30),
+            ("CSG", 25.0, 30),
+            ("SHG", 11.0, 100),
+            ("CSG", 90.0, 100),
             ("CSF", 8.0, 100),
             ("CSD", 25.0, 100),
         ] {
@@ -164,7 +172,7 @@ mod tests {
     fn a_size_between_two_follows_from_the_cube() {
         let mut worst = 0.0_f64;
         for ratio in [50, 80] {
-            let rows = of_ratio(ratio);
+            let rows = of_ratio(ratio, 0);
             for three in rows.windows(3).filter(|three| three[0].size >= 20.0) {
                 let found = SizeRow::between(&three[0], &three[2], three[1].size);
                 let off = |k: usize| (found.stiffness[k] / three[1].stiffness[k] - 1.0).abs();
@@ -180,8 +188,9 @@ mod tests {
     /// Every line gives all of a sheet, its loads in their order and its stiffness growing.
     #[test]
     fn every_line_makes_a_sheet_that_a_file_takes() {
-        for row in [30, 50, 80, 100, 120, 160].into_iter().flat_map(of_ratio) {
-            for series in SERIES {
+        for series in SERIES {
+            let own = usize::from(series.ends_with('G'));
+            for row in [30, 50, 80, 100, 120, 160].into_iter().flat_map(|ratio| of_ratio(ratio, own)) {
                 let stated = sheet(series, row.size, row.ratio).unwrap();
                 let read = Stated::of_file("d.toml", &stated.to_toml()).unwrap().unwrap();
                 assert_eq!(read, stated, "{series} {row:?}");
