@@ -549,23 +549,25 @@ fn clock(read: &[ReadRows]) -> (TimeKind, Option<f64>) {
 
 /// The mapping, if generator and output or an error are known.
 fn option(guesses: &[Guess], notes: &mut Vec<String>) -> Option<String> {
-    let is_open = |guess: &Guess| guess.written().is_none();
-    let entries = |with: &dyn Fn(&Guess) -> bool| {
-        let used = guesses.iter().filter(|guess| guess.column.used && with(guess));
-        used.map(Guess::entry).collect::<Vec<_>>().join(",")
-    };
-    let open = guesses.iter().filter(|guess| guess.column.used && is_open(guess)).count();
+    let mut entries: Vec<String> = guesses.iter().filter(|guess| guess.column.used).map(Guess::entry).collect();
+    let [generator, output, error] =
+        [Role::Generator, Role::Output, Role::Error].map(|role| used(guesses, role).is_some());
+    let mut open = guesses.iter().filter(|guess| guess.column.used && guess.written().is_none()).count();
     if open > 0 {
-        let entries = entries(&|guess| guess.column.role.is_angle() || is_open(guess));
-        let which = if open == 1 { "that column" } else { "these columns" };
+        // Without the turn of the one, nothing shows that another angle follows it.
+        let is_other = |guess: &&Guess| guess.said.angle && guess.column.role == Role::Unknown && guess.moves();
+        let mut others = guesses.iter().filter(is_other);
+        if let (true, false, Some(other), None) = (generator, output || error, others.next(), others.next()) {
+            entries.push(format!("output{}", other.entry()));
+            open += usize::from(other.written().is_none());
+        }
+        let (entries, which) = (entries.join(","), if open == 1 { "that column" } else { "these columns" });
         let (what, word) = if entries.contains("UNIT") { ("unit", "UNIT") } else { ("counts of a turn", "COUNTS") };
         notes.push(format!("give the {what} of {which} in place of {word}: --columns {entries}"));
         return None;
     }
-    let [generator, output, error] =
-        [Role::Generator, Role::Output, Role::Error].map(|role| used(guesses, role).is_some());
     if generator && (output || error) {
-        return Some(entries(&|_| true));
+        return Some(entries.join(","));
     }
     // The column of a role by its name, in use or not.
     let named = |role: Role| guesses.iter().find(|guess| guess.column.role == role && guess.moves());

@@ -685,9 +685,9 @@ fn the_columns_of_one_joint_are_proposed_together() {
         assert!(torque.starts_with("joint_torque_current"), "what was measured: {}", text(&looked));
         assert!((looked.ratio_found.unwrap() - 101.0).abs() < 0.5, "{}", text(&looked));
         // What is missing is said, not that nothing is known.
-        let due = format!("--columns generator={generator}:count/COUNTS,output={output}:count/COUNTS");
+        let due = format!(",generator={generator}:count/COUNTS,output={output}:count/COUNTS");
         assert!(
-            looked.columns_option.is_none() && looked.notes.iter().any(|note| note.ends_with(&due)),
+            looked.columns_option.is_none() && looked.notes.iter().any(|note| note.contains(&due)),
             "{}",
             text(&looked)
         );
@@ -710,7 +710,7 @@ fn counts_that_the_file_does_not_say_are_asked() {
         looked.columns[1]
     );
     assert!(looked.columns[1].confidence < 0.7, "{:?}", looked.columns[1]);
-    let due = "--columns generator=motor:count/COUNTS,output=load:rad";
+    let due = "--columns time=time:s,generator=motor:count/COUNTS,output=load:rad,torque=torque:N.m";
     assert!(looked.notes.iter().any(|note| note.ends_with(due)), "{}", text(&looked));
     // The counts of a register are not those of the other encoder where the ratio is none.
     let registers = file("time,motor,load,torque\n", ",", |t, k| {
@@ -718,12 +718,21 @@ fn counts_that_the_file_does_not_say_are_asked() {
         with(with(plain(t, k), 1, format!("{motor:.0}")), 2, counts(t.output_rad[k] + 2.5, 1_048_576.0))
     });
     let looked = looked_at(registers.as_bytes()).unwrap();
-    let due = "--columns generator=motor:count/16384,output=load:count/COUNTS";
+    let due = "--columns time=time:s,generator=motor:count/16384,output=load:count/COUNTS,torque=torque:N.m";
+    assert!(looked.notes.iter().any(|note| note.ends_with(due)), "{}", text(&looked));
+    // So are those of an output whose name says that it is an angle, and no more.
+    let angles = file("time,motor_counts,axis_counts,torque\n", ",", |t, k| {
+        let [motor, axis] =
+            [(t.generator_rad[k], 16_384.0), (t.output_rad[k], 16_777_216.0)].map(|(a, n)| counts(a, n));
+        with(with(plain(t, k), 1, motor), 2, axis)
+    });
+    let looked = looked_at(angles.as_bytes()).unwrap();
+    let due = "generator=motor_counts:count/COUNTS,torque=torque:N.m,output=axis_counts:count/COUNTS";
     assert!(looked.notes.iter().any(|note| note.ends_with(due)), "{}", text(&looked));
     // So are units that are written and not known, and no size is assumed.
     let looked = looked_at(file("time_s,motor [foo],load [foo],torque [Nmx]\n", ",", plain).as_bytes()).unwrap();
     assert!(looked.columns_option.is_none() && looked.columns[1..].iter().all(|column| column.unit.is_none()));
-    let due = "--columns generator=motor [foo]:UNIT,output=load [foo]:UNIT,torque=torque [Nmx]:UNIT";
+    let due = "--columns time=time_s:s,generator=motor [foo]:UNIT,output=load [foo]:UNIT,torque=torque [Nmx]:UNIT";
     assert!(looked.notes.iter().any(|note| note.ends_with(due)), "{}", text(&looked));
     let due = "column 4, torque: found the unit \"Nmx\", allowed: N.m, N.cm, N.mm, ";
     assert!(looked.notes.iter().any(|note| note.starts_with(due)), "{}", text(&looked));
