@@ -17,7 +17,7 @@
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_tests::motion::{hhd_95, loaded, mean_error, mean_generator_torque, range};
+use flexspline_tests::motion::{hhd_95, loaded, mean_error, mean_generator_torque};
 
 const TORQUE_N_M: f64 = 50.0;
 
@@ -43,30 +43,16 @@ fn balanced_error(kind: GeneratorKind) -> f64 {
     // The drag of the output takes its part of the load.
     let drag = samples[0].increment.drag_torque_n_m;
     let expected = -(TORQUE_N_M + drag) / 95.0;
-    println!(
-        "{kind}: generator torque {torque:.6} N·m on the mean of a pitch, (T + drag)/95 = {:.6}, off by {:.1e}; in \
-         the pitch it varies by {:.4}",
-        -expected,
-        torque / expected - 1.0,
-        range(samples.iter().map(|s| s.increment.generator_torque_n_m).collect::<Vec<_>>())
-    );
     assert!((torque / expected - 1.0).abs() <= 1e-3, "{kind}: mean generator torque {torque}, expected {expected}");
 
     let unbalanced = samples
         .iter()
         .map(|s| (s.increment.flank_torque_n_m + s.increment.drag_torque_n_m + TORQUE_N_M).abs() / TORQUE_N_M)
         .fold(0.0, f64::max);
-    println!("{kind}: torque on the output balances to {unbalanced:.1e} of the load");
     assert!(unbalanced <= 1e-6, "{kind}: torque on the output is off by {unbalanced} of the load");
 
     let by_generator = torque * pitch;
     let by_load = (TORQUE_N_M + drag) * output_turn;
-    println!(
-        "{kind}: work over a pitch, generator {:.6} N·m, load {:.6} N·m, sum {:.1e} of either",
-        by_generator,
-        by_load,
-        (by_generator + by_load) / by_load
-    );
     assert!(((by_generator + by_load) / by_load).abs() <= 1e-3, "{kind}: work {by_generator} and {by_load}");
     assert!((output_turn * ARCSEC_PER_RAD - pitch / 95.0 * ARCSEC_PER_RAD).abs() < 1e-3);
     mean_error(&samples)
@@ -76,9 +62,6 @@ fn balanced_error(kind: GeneratorKind) -> f64 {
 fn all_balance_and_the_cam_is_stiffest_and_the_two_roller_softest() {
     let order = [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller, GeneratorKind::TwoRoller];
     let errors = order.map(balanced_error);
-    for (kind, error) in order.iter().zip(errors) {
-        println!("{kind}: {error:.2}\" = {:.3}' at {TORQUE_N_M} N·m", error / 60.0);
-    }
     for k in 1..4 {
         assert!(errors[k] > 1.5 * errors[k - 1], "{} {}\", {} {}\"", order[k - 1], errors[k - 1], order[k], errors[k]);
     }

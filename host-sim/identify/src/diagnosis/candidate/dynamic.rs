@@ -65,13 +65,17 @@ fn moment_that_turns_flanks(
     [best[0], best[1].rem_euclid(2.0 * PI)]
 }
 
-/// The columns of a load that the torque does not hold: its wind-up and the play that it moves by this law.
+/// How far a load is off the one that its law was put to. *Guess*: what a step between places leaves.
+const AS_FITTED: f64 = 0.02;
+
+/// The columns of a load that the torque does not hold: its wind-up and the play that it moves by this law, as wide as
+/// that of a unit may be.
 pub(super) fn columns_of_load(on: &Excitation<'_>, added: &[f64], law: PlayLaw) -> Vec<Regressor> {
     let torque = of_both(&on.rows.torque, added, |torque, added| torque + added);
     let flank = law.flanks(on.rows, &torque, on.nominal);
     let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
     let together = by_row(on, |k| on.wound_up(k, torque[k]) + play[k]);
-    vec![main_about(1.0, together, 0.02).called(Tag::SIZE), main(play, 0.5)]
+    vec![main_about(1.0, together, AS_FITTED).called(Tag::SIZE), main(play, on.nominal.spread.backlash.max(AS_FITTED))]
 }
 
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and
