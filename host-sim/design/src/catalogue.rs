@@ -67,12 +67,8 @@ pub fn sizes_in_words() -> String {
         let rows = of_ratio(ratio, 0);
         format!("{} to {}", rows[0].size, rows[rows.len() - 1].size)
     };
-    let [series, high] = [SERIES.join(", "), HIGH_RATIOS.end().to_string()];
-    let [low, from_50, from_80] = [30, 50, 80].map(sizes);
-    format!(
-        "{series} of i = 30 (sizes {low}), 50 ({from_50}) and 80 to {high} ({from_80}), CSG and SHG from size 14 and \
-         i = 50 on"
-    )
+    let series = SERIES.join(", ") + " (these two from i = 50 and size 14)";
+    format!("{series} of i = 30 (sizes {}), 50 ({}) and 80 to 160 ({})", sizes(30), sizes(50), sizes(80))
 }
 
 /// A line.
@@ -157,7 +153,6 @@ mod tests {
             ("CSG", 25.0, 200),
             ("CSF", 40.0, 30),
             ("CSG", 25.0, 30),
-            ("SHG", 11.0, 100),
             ("CSG", 90.0, 100),
             ("CSF", 8.0, 100),
             ("CSD", 25.0, 100),
