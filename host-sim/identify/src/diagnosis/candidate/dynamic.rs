@@ -287,15 +287,13 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
 /// Models of an unbalanced load: the load that gravity adds moves the torque at which the play turns over, so that the
 /// law which the play follows there shows only now.
 fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
-    let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
-    if !plays.contains(&on.base.law) {
-        plays.push(on.base.law);
-    }
+    let known = [PlayLaw::Held, PlayLaw::Pushed];
     // It is one with a spring that nobody knows.
-    plays.retain(|_| on.base.floating.iter().all(|of| of.name != WAVE_OF_LOAD));
+    let is_told = on.base.floating.iter().all(|of| of.name != WAVE_OF_LOAD);
+    let plays = known.into_iter().chain(Some(on.base.law).filter(|law| !known.contains(law))).filter(|_| is_told);
     let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
     let on_sample = thinned.as_ref().map_or(*on, |thinned| on.over(&thinned.rows, &thinned.base));
-    plays.into_iter().map(|play| gravity_torque(play, on, &on_sample).variant(play.as_str())).collect()
+    plays.map(|play| gravity_torque(play, on, &on_sample).variant(play.as_str())).collect()
 }
 
 /// Gravity turns an unbalanced load, which the torque column does not hold.
