@@ -20,7 +20,7 @@ pub(super) fn tell_fitted(recording: &mut Recording, found: &FittedFault) {
         let Some(all) = throughout(sessions, found.name) else { return };
         let what = format!(
             "the zero of the error drifts by {size_arcsec:.1} arcsec in all, {value:.1} an hour (standard deviation \
-             {std:.2}), whatever else the drive does: a straight line in time is taken out"
+             {std:.2}), or a load that is not recorded changes: a straight line in time is taken out"
         );
         for session in sessions {
             let rows = session.error_rad.iter_mut().zip(session.time_s.iter().flatten());
@@ -66,8 +66,8 @@ pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
     let sessions = if all.len() == 2 { "session 2".to_owned() } else { format!("sessions 2 to {}", all.len()) };
     let what = format!(
         "the zero of the error is another one in each session: that of {sessions} lies {}{more} arcsec (± {std:.1} at \
-         most) beside that of the first, by no whole number of motor turns or tooth pitches; the zero of each is \
-         fitted on its own",
+         most) beside that of the first, by no whole number of motor turns or tooth pitches, or a load that is not \
+         recorded is another; the zero of each is fitted on its own",
         said.join(", ")
     );
     for session in recording.sessions.iter_mut().skip(1) {
