@@ -181,13 +181,6 @@ fn small_deflection(kind: GeneratorKind) {
     }
     let force = quadrant_force(&problem, &settings, &state);
     let expected = closed_form_force(&drive, kind);
-    println!(
-        "{kind}, w0 {w0} mm: w within {:.4} %, v within {:.4} % of w0; force in a quadrant {force:.6e} N/mm, closed \
-         form {:.6e}",
-        100.0 * in_w,
-        100.0 * in_v,
-        expected.unwrap_or(f64::NAN)
-    );
     assert!(in_w <= 1e-3 && in_v <= 1e-3, "{kind}: w off by {in_w}, v by {in_v} of w0");
     if let Some(expected) = expected {
         assert!((force / expected - 1.0).abs() <= 2e-3, "{kind}: force {force}, closed form {expected}");
