@@ -74,8 +74,10 @@ await check("a log dropped on it leads to a verdict and a table", async () => {
   const begun = Date.now();
   await input.uploadFile(path.join(project, "examples/csf17_100/error_vs_input.csv"));
   await page.waitForSelector("#first-rows");
-  await page.type("#ratio", "100");
-  await page.keyboard.press("Enter");
+  for (const [field, value] of [["#ratio", "100"], ["#backlash", "30"]]) {
+    await page.type(field, value);
+    await page.keyboard.press("Enter");
+  }
   const verdict = await until("verdict");
   if (!/^(not_understood|fault_found|nothing_found) \d+$/.test(verdict)) throw new Error(verdict);
   await page.waitForSelector("a[download='calibrated.fxt']");
