@@ -67,8 +67,8 @@ pub fn sizes_in_words() -> String {
         let rows = of_ratio(ratio, 0);
         format!("{} to {}", rows[0].size, rows[rows.len() - 1].size)
     };
-    let series = SERIES.join(", ") + " (these two from i = 50 and size 14)";
-    format!("{series} of i = 30 (sizes {}), 50 ({}) and 80 to 160 ({})", sizes(30), sizes(50), sizes(80))
+    let (series, high) = (SERIES.join(", ") + " (these two from i = 50 and size 14)", HIGH_RATIOS.end());
+    format!("{series} of i = 30 (sizes {}), 50 ({}) and 80 to {high} ({})", sizes(30), sizes(50), sizes(80))
 }
 
 /// A line.
