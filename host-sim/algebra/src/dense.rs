@@ -24,19 +24,16 @@ pub fn cholesky(matrix: MatRef<'_>) -> Result<CholeskyFactor, NotPositiveDefinit
 
 impl CholeskyFactor {
     /// `A⁻¹ B`.
-    #[must_use]
     pub fn solve(&self, right_hand_sides: MatRef<'_>) -> Mat {
         self.0.solve(right_hand_sides)
     }
 
     /// `ln |A|`.
-    #[must_use]
     pub fn log_determinant(&self) -> f64 {
         self.0.L().diagonal().column_vector().iter().map(|pivot| 2.0 * pivot.ln()).sum()
     }
 
     /// `A⁻¹`.
-    #[must_use]
     pub fn inverse(&self) -> Mat {
         let size = self.0.L().nrows();
         self.0.solve(Mat::identity(size, size))
@@ -45,14 +42,12 @@ impl CholeskyFactor {
 
 /// Eigenvalues of a symmetric matrix, of which the lower triangle is read, and its eigenvectors, the columns of a
 /// matrix; nothing where they are not found.
-#[must_use]
 pub fn eigen(matrix: MatRef<'_>) -> Option<(Vec<f64>, Mat)> {
     let found = matrix.self_adjoint_eigen(Side::Lower).ok()?;
     Some((found.S().column_vector().iter().copied().collect(), found.U().to_owned()))
 }
 
 /// `A B`.
-#[must_use]
 pub fn product(a: MatRef<'_>, b: MatRef<'_>) -> Mat {
     a * b
 }

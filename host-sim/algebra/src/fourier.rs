@@ -9,7 +9,6 @@ pub use realfft::num_complex::Complex;
 static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(|| Mutex::new(RealFftPlanner::new()));
 
 /// `Σ values[n] exp(-2πi k n / N)` for `k` from 0 to `N / 2`; the values are lost.
-#[must_use]
 pub fn spectrum(values: &mut [f64]) -> Vec<Complex<f64>> {
     let transform = PLANNER.lock().unwrap_or_else(PoisonError::into_inner).plan_fft_forward(values.len());
     let mut sums = transform.make_output_vec();

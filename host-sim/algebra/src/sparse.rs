@@ -25,7 +25,6 @@ impl SparseCholesky {
     ///
     /// # Panics
     /// If the pattern is none, or the factor does not fit in memory.
-    #[must_use]
     pub fn new(column_starts: &[u32], rows: &[u32]) -> SparseCholesky {
         let n = column_starts.len() - 1;
         let structure = SymbolicSparseColMatRef::new_checked(n, n, column_starts, None, rows);

@@ -173,7 +173,6 @@ impl HiddenFile {
 
 impl Outputs {
     /// No file yet.
-    #[must_use]
     pub fn new() -> Outputs {
         Outputs::default()
     }
@@ -317,7 +316,6 @@ fn parent_of(path: &Path) -> &Path {
 }
 
 /// A word as a shell takes it.
-#[must_use]
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

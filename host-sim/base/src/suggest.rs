@@ -33,7 +33,6 @@ const LONGEST_UNIT: usize = 6;
 const LONGEST_NAME: usize = 200;
 
 /// The name of `known` that `found` is likely to mean; `None` if it is one of them, or like none.
-#[must_use]
 pub fn likeliest<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
     let meant = words(found);
     known
@@ -46,7 +45,6 @@ pub fn likeliest<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> O
 
 /// The path of `known`, `section.key`, that `found` is likely to mean: the same key in a section like the one found, or
 /// one there that goes on where it ends; the same key in any other; else a key like it.
-#[must_use]
 pub fn likeliest_path<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
     fn split(path: &str) -> (&str, &str) {
         path.rsplit_once('.').unwrap_or(("", path))
@@ -71,7 +69,6 @@ pub fn likeliest_path<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
 }
 
 /// `` did you mean `…`? `` behind `before`, or nothing.
-#[must_use]
 pub fn did_you_mean<'k>(before: &str, found: &str, known: impl IntoIterator<Item = &'k str>) -> String {
     likeliest(found, known).map_or_else(String::new, |name| before.to_owned() + &question(name))
 }
@@ -80,7 +77,6 @@ pub fn did_you_mean<'k>(before: &str, found: &str, known: impl IntoIterator<Item
 pub const MARKS: [&str; 2] = ["did you mean `", "`?"];
 
 /// `` did you mean `name`? ``
-#[must_use]
 pub fn question(name: &str) -> String {
     format!("{}{name}{}", MARKS[0], MARKS[1])
 }

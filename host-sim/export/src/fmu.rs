@@ -83,7 +83,6 @@ impl Fmu {
     }
 
     /// The resources that its libraries read.
-    #[must_use]
     pub fn resources(&self) -> &Resources {
         &self.resources
     }
@@ -121,7 +120,6 @@ impl Fmu {
     }
 
     /// The files of its resources, by name.
-    #[must_use]
     pub(crate) fn resource_files(&self) -> Vec<(&'static str, Vec<u8>)> {
         let Resources { image, gears, .. } = &self.resources;
         let mut files = vec![(MODEL_FILE, self.resources.model_file().into_bytes()), (TABLE_FILE, image.clone())];

@@ -32,7 +32,6 @@ impl GearMap {
     ///
     /// # Panics
     /// Never: the maps are those of this crate.
-    #[must_use]
     pub fn of(kind: GeneratorKind) -> Self {
         let text = match kind {
             GeneratorKind::TwoRoller => include_str!("../plant/two-roller.csv"),
@@ -68,7 +67,6 @@ impl GearMap {
     }
 
     /// The drive at a temperature, °C.
-    #[must_use]
     pub fn at(&self, temperature_c: f64) -> WindUp {
         let Self { largest_n_m, teeth, phases, temperatures_c: [cold, warm], .. } = *self;
         let share = (temperature_c - cold) / (warm - cold);
@@ -98,7 +96,6 @@ pub struct WindUp {
 impl WindUp {
     /// Error of the output with a flank torque at a generator angle, rad; exactly none on the flanks is the limit from
     /// the side of `sign`.
-    #[must_use]
     pub fn elastic_error_rad(&self, generator_rad: f64, flank_n_m: f64, sign: f64) -> f64 {
         let phases = self.phases;
         let nodes = self.plane.len() / phases - 1;

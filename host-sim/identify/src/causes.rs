@@ -138,7 +138,6 @@ table! {
 
 impl Need {
     /// Why the cause cannot be judged without it.
-    #[must_use]
     pub const fn missing(self) -> &'static str {
         self.row().0
     }
@@ -178,19 +177,16 @@ impl CauseName {
     }
 
     /// Its name in files, snake case.
-    #[must_use]
     pub fn as_str(self) -> &'static str {
         self.spec().name
     }
 
     /// Its name in a sentence.
-    #[must_use]
     pub fn words(self) -> &'static str {
         self.spec().words
     }
 
     /// Its effect on the error, in a few words.
-    #[must_use]
     pub fn does(self) -> &'static str {
         self.spec().does
     }

@@ -22,7 +22,6 @@ pub(crate) struct Gram {
 
 impl Gram {
     /// Of no rows.
-    #[must_use]
     pub fn none(size: usize) -> Gram {
         Gram { size, products: vec![0.0; size * size] }
     }
@@ -35,7 +34,6 @@ impl Gram {
     }
 
     /// Of some of the columns; the lower triangle is read.
-    #[must_use]
     pub fn among(&self, places: &[usize]) -> Gram {
         let mut products = Vec::with_capacity(places.len() * places.len());
         for i in places {
@@ -45,7 +43,6 @@ impl Gram {
     }
 
     /// Without the first column, whose coefficient is free in these rows; the lower triangle is read.
-    #[must_use]
     pub fn first_free(&self) -> Gram {
         let mut own = self.clone();
         if self.at(0, 0) > 0.0 {
@@ -56,7 +53,6 @@ impl Gram {
     }
 
     /// Sum of squares that the columns leave with these coefficients.
-    #[must_use]
     pub fn left_by(&self, coefficients: &[f64]) -> f64 {
         let all: Vec<f64> = coefficients.iter().copied().chain([-1.0]).collect();
         let rows = self.products.chunks_exact(self.size);
@@ -64,13 +60,11 @@ impl Gram {
     }
 
     /// Products of `columns`, whose last is the data, over a range of rows.
-    #[must_use]
     pub fn of(columns: &[&[f64]], range: Range<usize>) -> Gram {
         Gram { size: columns.len(), products: products(columns, columns, range, true) }
     }
 
     /// Product of two columns.
-    #[must_use]
     pub fn at(&self, i: usize, j: usize) -> f64 {
         self.products[i * self.size + j]
     }

@@ -134,7 +134,6 @@ pub struct Nominal {
 
 impl Nominal {
     /// The gear, for the reader of data.
-    #[must_use]
     pub fn gear(&self) -> Gear {
         let gear = match self.teeth {
             Some(teeth) => {
@@ -147,7 +146,6 @@ impl Nominal {
     }
 
     /// Wind-up under a torque, arcsec, of the sign of the torque.
-    #[must_use]
     pub fn wind_up_arcsec(&self, torque_n_m: f64) -> f64 {
         let load = torque_n_m.abs();
         let mut angle_rad = 0.0;
@@ -166,7 +164,6 @@ impl Nominal {
     }
 
     /// Kinematic error at a generator angle, arcsec.
-    #[must_use]
     pub fn harmonics_arcsec(&self, generator_rad: f64) -> f64 {
         self.harmonics
             .iter()
@@ -176,7 +173,6 @@ impl Nominal {
 
     /// The teeth; of a model that gives a ratio alone, those of the strain wave drive of two waves that has it:
     /// `z_c / 2` with the flexspline fixed, `-z_f / 2` with the circular spline fixed, and two teeth of difference.
-    #[must_use]
     pub fn teeth_or_of_two_waves(&self) -> Teeth {
         self.teeth.unwrap_or_else(|| {
             let more = (2.0 * self.ratio.abs()).round().max(3.0) as u32;
@@ -204,7 +200,6 @@ impl Nominal {
     /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature;
     /// the backlash is what is left of it as the torque goes to zero, or what the direction does without a load, if the
     /// table has no loads of both signs. Kinematic error is left to the table's own prediction.
-    #[must_use]
     pub fn of_table(table: &Table<'_>) -> Nominal {
         let drive = table.drive();
         let teeth = Teeth {
@@ -285,7 +280,6 @@ impl Nominal {
 
     /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit,
     /// meaning, sign and what is allowed. It is read back as it stands.
-    #[must_use]
     pub fn template(flexspline_teeth: u32, circular_spline_teeth: u32) -> String {
         let Spread { stiffness, backlash, harmonic, .. } = USUAL_SPREAD;
         let (fewest, most) = (TEETH.low, TEETH.high);

@@ -48,7 +48,6 @@ impl PartName {
     ];
 
     /// Its name in files.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
             PartName::WindUp => "wind_up",

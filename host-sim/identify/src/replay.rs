@@ -143,7 +143,6 @@ impl RowsOf {
 
     /// Why these rows are not of the drive and the generator that a table was made of, or the table names no generator
     /// that is simulated.
-    #[must_use]
     pub fn problem(&self, table: &Table<'_>) -> Option<String> {
         let hash = blake3::Hash::from(table.drive_hash()).to_hex().to_string();
         let generator = generator_of(table).map_or_else(|| "an unknown generator".to_owned(), |kind| kind.to_string());

@@ -122,7 +122,6 @@ pub struct WindUpCurve<'t> {
 
 impl<'t> WindUpCurve<'t> {
     /// By a table, from where a drive rests in its play, with springs that hold nothing yet.
-    #[must_use]
     pub fn new(table: &'t Table<'t>, play: PlayState, hysteresis: Hysteresis) -> Self {
         Self { table, play, hysteresis, held: HeldTorques::default() }
     }

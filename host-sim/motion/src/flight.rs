@@ -131,7 +131,6 @@ impl JointUnit {
 
     /// Built without errors: no lines, no ripple of the tooth pitch. What ripples with it is encoder, servo, friction
     /// and wind.
-    #[must_use]
     pub fn flawless(&self) -> Self {
         let spring = match &self.built.spring {
             Spring::Sampled(sampled) => Spring::Sampled(Box::new(sampled.without_ripple())),

@@ -168,7 +168,6 @@ impl SampledSpring {
     }
 
     /// Stiffer by a factor, and with so much more clearance on each side: what a unit has beside the nominal drive.
-    #[must_use]
     pub fn as_built(&self, stiffer: f64, wider_rad: f64) -> Self {
         let scaled = |twist: f64| {
             let inner = ((twist - wider_rad) * stiffer).max(0.0);
@@ -181,7 +180,6 @@ impl SampledSpring {
     }
 
     /// Its mean over the tooth pitch.
-    #[must_use]
     pub(crate) fn without_ripple(&self) -> Self {
         let mean = |curves: &[Piece; CURVES]| {
             let [mean, ..] = curves;

@@ -81,7 +81,6 @@ impl OnBoard {
     }
 
     /// One tick.
-    #[must_use]
     pub fn tick(&mut self, images: &Images<'_>, store: &mut Store, input: &OnBoardInput) -> OnBoardOutput {
         let torque_n_m = self.torque_n_m(input);
         let [ahead_rate, mut ahead_acceleration] =
@@ -115,7 +114,6 @@ impl OnBoard {
 /// Whether tooth pitches pass so slowly at a rate of the output that their acceleration may be fed forward: six ticks
 /// or more for each. What comes a tick late is then less than 60° behind, and takes off more than it adds; faster ones
 /// excite the resonance.
-#[must_use]
 pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
     const TICKS: f32 = 6.0;
     let pitches = rate_rad_s.abs() * drive.ratio().abs() * f32::from(drive.ripple_order()) / core::f32::consts::TAU;
@@ -123,7 +121,6 @@ pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
 }
 
 /// All bits of what a tick gives into a running hash (FNV-1a, by words).
-#[must_use]
 pub fn hashed(hash: u64, given: &OnBoardOutput) -> u64 {
     let OnBoardOutput { out, torque_n_m, ahead: [rate, acceleration] } = given;
     let words = [

@@ -11,7 +11,6 @@ use flexspline_identify::calibrate::{Calibrated, Calibration, PartSays, Split, S
 const MOST_POINTS: usize = 4000;
 
 /// The page.
-#[must_use]
 pub fn page(made: &Calibrated) -> Page {
     let c = &made.calibration;
     let reading = PageSection::reading(vec![PageBlock::paragraph(

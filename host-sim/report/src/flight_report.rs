@@ -11,7 +11,6 @@ use super::page::{
 use flexspline_fly::fly::{ByController, Flown, LEAST_PHASE_MARGIN_DEG, Results, settles_in, spectrum};
 
 /// The page; `command` is the line that made it.
-#[must_use]
 pub fn page(flown: &Flown, flight: &Flight, results: &Results, command: &str) -> Page {
     let remarks = results.remarks.clone();
     let status = if results.servo_is_near_the_edge() || !results.stable {

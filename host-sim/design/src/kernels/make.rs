@@ -36,7 +36,6 @@ impl KernelPlan {
     /// The default: loads from 0.25 % of the largest that the generator is used to, evenly in their roots above 2 %;
     /// the displacements that drives of this kind are built with (up to 15 µm), close where they eat up the clearance,
     /// and twice that; directions 9.5° apart.
-    #[must_use]
     pub fn for_generator(kind: GeneratorKind) -> KernelPlan {
         let largest = kind.rated_torque_n_m();
         let steps = 7;
@@ -52,7 +51,6 @@ impl KernelPlan {
     }
 
     /// The same for a drive: loads as it is rated, displacements in terms of its module.
-    #[must_use]
     pub fn for_drive(drive: &Drive, kind: GeneratorKind) -> KernelPlan {
         let usual = KernelPlan::for_generator(kind);
         let load = drive.rated_torque_n_m(kind) / kind.rated_torque_n_m();
@@ -65,7 +63,6 @@ impl KernelPlan {
     }
 
     /// Displacements of this plan as far as `reach_um`, and where they do not go so far, on to it.
-    #[must_use]
     pub(crate) fn sizes_to(&self, reach_um: f64) -> Vec<f64> {
         let mut sizes = self.sizes_um.clone();
         if let Some(enough) = sizes.iter().position(|size| *size >= reach_um) {
@@ -81,7 +78,6 @@ impl KernelPlan {
     }
 
     /// Steps that progress counts.
-    #[must_use]
     pub fn steps(&self) -> usize {
         2 * self.torques_n_m.len() + self.sizes_um.len() * self.directions + 1
     }

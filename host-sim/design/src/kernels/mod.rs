@@ -180,7 +180,6 @@ impl Kernels {
     }
 
     /// Response to a cumulative pitch error `cos(order α)` µm of a wheel, α the angle on its body.
-    #[must_use]
     pub fn pitch_error(&self, wheel: Wheel, order: u32, torque_n_m: f64) -> Gain {
         let gain = |l: &LoadKernels| self.transfer(&l.wheel(wheel).along, wheel, f64::from(order));
         self.under(torque_n_m, gain, |l| conjugate(gain(l)))
@@ -188,7 +187,6 @@ impl Kernels {
 
     /// Error (arcsec) for each µm that one tooth (or space) at `place_rad` from the major axis is displaced along the
     /// pitch.
-    #[must_use]
     pub(crate) fn displaced(&self, wheel: Wheel, place_rad: f64, torque_n_m: f64) -> f64 {
         let at = |l: &LoadKernels, place: f64| [self.at(&l.wheel(wheel).along, wheel, place)];
         // Mirrored, place, displacement and error all change their sign.
@@ -198,7 +196,6 @@ impl Kernels {
 
     /// Response to an oval circular spline, `cos(2 α)` µm outward, with the displacement along the ring and the
     /// rotation of a ring that keeps its length.
-    #[must_use]
     pub fn ovality(&self, torque_n_m: f64) -> Gain {
         let wheel = Wheel::CircularSpline;
         let gain = |l: &LoadKernels| {
@@ -215,7 +212,6 @@ impl Kernels {
 
     /// Error (arcsec) for each µm that a flank lacks, its tooth (or, for the circular spline, its space) at `place_rad`
     /// from the major axis.
-    #[must_use]
     pub fn missing(&self, wheel: Wheel, flank: DamagedFlank, place_rad: f64, torque_n_m: f64) -> f64 {
         let plus = |l: &LoadKernels, place: f64| self.at(&l.wheel(wheel).plus_flank, wheel, place);
         let minus = |l: &LoadKernels, place: f64| self.at(&l.wheel(wheel).minus_flank, wheel, place);
@@ -231,7 +227,6 @@ impl Kernels {
     }
 
     /// Error (arcsec) for each µm that the generator stands further out over one pitch of the bore at `place_rad`.
-    #[must_use]
     pub fn generator(&self, place_rad: f64, torque_n_m: f64) -> f64 {
         let at = |l: &LoadKernels, place: f64| self.at(&l.generator, Wheel::Flexspline, place);
         let [error] = self.under(torque_n_m, |l| [at(l, place_rad)], |l| [-at(l, -place_rad)]);
@@ -239,7 +234,6 @@ impl Kernels {
     }
 
     /// Where a load lies between those of the eccentricity: for [`EccentricField::at`].
-    #[must_use]
     pub fn place_of_load(&self, torque_n_m: f64) -> PlaceOfLoad {
         let (low, high, part) = Self::between(self.eccentric.torques_n_m.iter().copied(), torque_n_m.abs());
         PlaceOfLoad { low, high, part }
@@ -247,7 +241,6 @@ impl Kernels {
 
     /// Error of a circular spline whose axis stands `size_um` beside the generator's, in every direction and under
     /// every load. Between sizes linear, from nothing at nothing; beyond the largest along the last slope.
-    #[must_use]
     pub fn eccentric_field(&self, size_um: f64) -> EccentricField {
         let e = &self.eccentric;
         let above = e.sizes_um.iter().position(|s| *s >= size_um).unwrap_or(e.sizes_um.len() - 1);
@@ -276,7 +269,6 @@ impl Kernels {
 
     /// Error (arcsec) of a circular spline whose axis stands `size_um` beside the generator's, in the direction
     /// `direction_rad` from the major axis.
-    #[must_use]
     pub fn eccentricity(&self, size_um: f64, direction_rad: f64, torque_n_m: f64) -> f64 {
         self.eccentric_field(size_um).at(direction_rad, torque_n_m < 0.0, self.place_of_load(torque_n_m))
     }
@@ -355,7 +347,6 @@ pub struct EccentricField {
 
 impl EccentricField {
     /// Error (arcsec) with the axis displaced in a direction from the major axis, rad, under a load of either sign.
-    #[must_use]
     pub fn at(&self, direction_rad: f64, negative_load: bool, load: PlaceOfLoad) -> f64 {
         let (sign, direction) = if negative_load { (-1.0, -direction_rad) } else { (1.0, direction_rad) };
         let n = self.by_load[load.low].len();

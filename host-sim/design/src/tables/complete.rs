@@ -233,7 +233,6 @@ pub struct MissingSpring {
 
 impl MissingSpring {
     /// Rotation of the output, rad, in the sense of the torque, N m.
-    #[must_use]
     pub fn torsion_rad(&self, torque_n_m: f64) -> f64 {
         let load = torque_n_m.abs();
         let ranges = [[0.0, self.t1_n_m], [self.t1_n_m, self.t2_n_m], [self.t2_n_m, f64::INFINITY]];
@@ -274,7 +273,6 @@ pub struct Completed {
 
 impl Completed {
     /// In one sentence.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let source = self.source.as_deref().unwrap_or("the data sheet");
         let added = |(range, slope): (&str, f64)| match slope {
@@ -294,7 +292,6 @@ impl Completed {
     }
 
     /// As comments of a drive file.
-    #[must_use]
     pub fn to_toml(&self, generator: &str) -> String {
         let MissingSpring { t1_n_m, t2_n_m, compliance_rad_per_n_m: [a, b, c] } = self.spring;
         let mut text = format!(

@@ -65,7 +65,6 @@ impl TableSettings {
     }
 
     /// Increments that a table will take, about, before its torque nodes are chosen: as many as with the most nodes.
-    #[must_use]
     pub fn most_increments(&self, drive: &Drive) -> usize {
         let most = self.torque_nodes.most;
         // The middles of intervals are looked at too, about one for each node that is found.

@@ -2,7 +2,6 @@
 
 /// How many even places over a turn are enough, within bounds, so that no order (waves in the turn) folds onto another:
 /// they stay apart by `apart`. A prime; the most that are allowed, where none of them separates the orders.
-#[must_use]
 pub fn places_that_tell_apart(orders: &[f64], [least, most]: [usize; 2], apart: f64) -> usize {
     let tells_apart = |count: &usize| {
         let fold = |order: &f64| (order - (order / *count as f64).round() * *count as f64).abs();

@@ -74,7 +74,6 @@ pub enum Places {
 
 impl Places {
     /// A folder that was named, or what this program has.
-    #[must_use]
     pub fn new(named: Option<&Path>) -> Places {
         let here = std::env::current_dir().unwrap_or_default();
         let checkout = || here.ancestors().find(|folder| is_checkout(folder)).map(Path::to_owned);

@@ -226,7 +226,6 @@ impl Bundle {
     }
 
     /// Path and contents of every file with these static libraries, the manifest last.
-    #[must_use]
     pub fn files(&self, libraries: &[BundleLibrary]) -> (Vec<(String, Vec<u8>)>, Manifest) {
         let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
         let mut put = |path: String, contents: Vec<u8>| drop(files.insert(path, contents));

@@ -14,7 +14,6 @@ fn legs(legs: &[(f64, f64)]) -> Vec<Leg> {
 }
 
 /// The scenario of a name.
-#[must_use]
 pub fn built_in(name: &str) -> Option<Flown> {
     let base = |legs: Vec<Leg>, load: Load| Scenario { legs, load, ..Scenario::usual(name) };
     let none = Load::default();

@@ -228,7 +228,6 @@ fn read_table(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Flown> {
 }
 
 /// A file that flies what is given, with every field, what it is and what is allowed.
-#[must_use]
 pub fn example(base: &str, mut flown: Flown) -> String {
     let mut file = format!(
         "# A scenario for `flexspline fly FILE`: {base}, with every field. A line that is left out is as in the \

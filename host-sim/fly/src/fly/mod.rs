@@ -39,7 +39,6 @@ pub struct Flown {
 ///
 /// # Panics
 /// Never: the core knows these teeth.
-#[must_use]
 pub fn unit(kind: GeneratorKind, temperature_c: f64) -> JointUnit {
     let map = GearMap::of(kind);
     let (teeth, wind_up) = (map.teeth, map.at(temperature_c));
@@ -58,7 +57,6 @@ impl Flown {
     }
 
     /// Seconds that all its joints fly, together.
-    #[must_use]
     pub fn seconds_of_all(&self) -> usize {
         JOINTS * self.scenario.seconds() as usize
     }

@@ -13,7 +13,6 @@ use flexspline_base::figures::NamedFigure;
 use super::file::name_of;
 
 /// A time to settle for a reader.
-#[must_use]
 pub fn settles_in(seconds: f64) -> String {
     if seconds.is_finite() { format!("{seconds:.2} s") } else { "never".to_owned() }
 }
@@ -46,7 +45,6 @@ pub struct ByController<T> {
 
 impl<T: Copy> ByController<T> {
     /// In the order of the controllers.
-    #[must_use]
     pub fn all(&self) -> [T; CONTROLLERS.len()] {
         let ByController { none, fourier, fourier_by_direction, compensated, ideal } = *self;
         [none, fourier, fourier_by_direction, compensated, ideal]
@@ -111,7 +109,6 @@ pub struct Results {
 
 impl Results {
     /// Its loops and limits in words, in their order; those that this flight does not have are left out.
-    #[must_use]
     pub fn figures(&self) -> Vec<NamedFigure> {
         let [margin, at_hz] = self.phase_margin_deg;
         let [held, free] = self.resonances_hz;
@@ -142,7 +139,6 @@ impl Results {
     }
 
     /// Whether the servo is stable and a little more delay, gain or inertia would make it ring.
-    #[must_use]
     pub fn servo_is_near_the_edge(&self) -> bool {
         self.servo_distance > 0.0 && !self.servo_is_sound()
     }
@@ -199,7 +195,6 @@ fn by_controller<T: Copy>(flight: &Flight, value: impl Fn(&Flown) -> T) -> ByCon
 }
 
 /// The numbers of a flight.
-#[must_use]
 pub fn results(flown: &super::Flown, flight: &Flight) -> Results {
     let scenario = &flown.scenario;
     let rms = by_controller(flight, |flown| flown.error.rms());
@@ -319,7 +314,6 @@ fn settle_s(scenario: &Scenario, flown: &Flown) -> f64 {
 }
 
 /// Amplitude of the error (arcsec) over frequency (Hz): rms of windows of 4 s, by Hann, averaged.
-#[must_use]
 pub fn spectrum(scenario: &Scenario, flown: &Flown) -> Vec<Row> {
     let mut power = vec![0.0; WINDOW / 2 + 1];
     let mut count = 0.0;

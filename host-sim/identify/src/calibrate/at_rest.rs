@@ -190,7 +190,6 @@ fn turn_over(rows: &mut [Row], knee: f64) {
 
 impl TorqueLoop {
     /// Of logs in which the generator stands and the load goes round; none of others.
-    #[must_use]
     pub fn of(files: &[Recording]) -> Option<TorqueLoop> {
         let (mut rows, most_n_m) = rows_of(files)?;
         let ([mut from, mut to], mut best) = (KNEES, (f64::INFINITY, 0.0));

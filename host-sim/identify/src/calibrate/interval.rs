@@ -301,7 +301,6 @@ impl ModelUncertainty {
     /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there,
     /// arcsec, but for one zero of all, which makes the mean over the rows right. At a speed the error is that of its
     /// log, which has a delay; without one, that of both angles at one instant.
-    #[must_use]
     pub fn half_width_arcsec(&self, at: &State) -> f64 {
         OF_95 * (self.variance_of(at, |_| true) + self.of_no_part_arcsec.powi(2)).sqrt()
     }

@@ -157,7 +157,6 @@ impl CalibrationError {
     }
 
     /// The error, with the files that it is of.
-    #[must_use]
     pub fn of_files(&self, files: &[String]) -> String {
         match self {
             CalibrationError::Measured(_) | CalibrationError::Known(_) => self.to_string(),
@@ -166,7 +165,6 @@ impl CalibrationError {
     }
 
     /// Whether the input is to blame.
-    #[must_use]
     pub fn is_bad_input(&self) -> bool {
         !matches!(self, CalibrationError::NothingGained(_) | CalibrationError::Table(_))
     }
@@ -370,7 +368,6 @@ pub struct Calibration {
 
 impl Calibration {
     /// Whether a log has a delay between the readings of the two angles, which is taken out of all errors.
-    #[must_use]
     pub fn has_delay(&self) -> bool {
         self.readings.iter().any(|reading| reading.name == DELAY)
     }

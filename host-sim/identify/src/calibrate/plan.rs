@@ -86,7 +86,6 @@ impl Default for Bench {
 
 impl Bench {
     /// Its fault, if any.
-    #[must_use]
     pub fn problem(&self) -> Option<String> {
         let length = [self.output_deg[1] - self.output_deg[0]];
         let any = [f64::NEG_INFINITY, f64::INFINITY];

@@ -35,7 +35,6 @@ pub struct Prior<'a> {
 
 impl<'a> Prior<'a> {
     /// A drive known by a nominal model, called `drive`; the hash is that of the name.
-    #[must_use]
     pub fn of_nominal(nominal: Nominal, drive: &str, kind: GeneratorKind) -> Prior<'a> {
         let hash = *blake3::hash(drive.as_bytes()).as_bytes();
         let drive = drive.to_owned();
@@ -53,7 +52,6 @@ impl<'a> Prior<'a> {
     }
 
     /// A drive known by its ratio alone: no wind-up, no play, no waves.
-    #[must_use]
     pub fn of_ratio(ratio: f64, kind: GeneratorKind) -> Prior<'a> {
         let none = Spread { stiffness: 0.0, backlash: 0.0, harmonic: 0.0, harmonic_phase_rad: 0.0 };
         let nominal = Nominal {
@@ -83,7 +81,6 @@ impl<'a> Prior<'a> {
     }
 
     /// A drive known by a table.
-    #[must_use]
     pub fn of_table(table: &'a Table<'a>, kind: GeneratorKind) -> Prior<'a> {
         let hash = *blake3::hash(table.image()).as_bytes();
         let drive = format!("table {}", table.id());
@@ -91,7 +88,6 @@ impl<'a> Prior<'a> {
     }
 
     /// Whether nothing but the ratio is known.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         let n = &self.nominal;
         self.table.is_none()

@@ -240,7 +240,6 @@ impl Calibration {
     /// The tables of the encoders, each with its name and this number of entries over a turn of the encoder; that of
     /// the output in counts as well, if it is known how many make a turn, negative where they fall as the angle rises.
     /// It goes by the zero of the first log.
-    #[must_use]
     pub fn encoder_tables(
         &self,
         entries: usize,

@@ -127,7 +127,6 @@ pub struct CalibrationFile {
 
 impl CalibrationFile {
     /// Of the file in the folder of a table, if that is of this table.
-    #[must_use]
     pub fn read(file: &Path, table: &Table<'_>) -> Option<Self> {
         let text = std::fs::read_to_string(file.with_file_name("calibration.json")).ok()?;
         let read: CalibrationFile = serde_json::from_str(&text).ok()?;

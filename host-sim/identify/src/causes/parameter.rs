@@ -81,13 +81,11 @@ pub enum Kind {
 
 impl ParameterName {
     /// As it stands in files.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         self.row().0
     }
 
     /// Its kind.
-    #[must_use]
     pub const fn kind(self) -> Kind {
         self.row().1
     }
@@ -129,7 +127,6 @@ pub struct ParameterSpec {
 
 impl ParameterSpec {
     /// Allowed values, in words.
-    #[must_use]
     pub fn allowed(&self) -> String {
         let [low, high] = self.range;
         let words = self.words.join(", ");
@@ -153,7 +150,6 @@ pub enum Factor {
 }
 
 /// A parameter that is a number.
-#[must_use]
 pub const fn number(name: ParameterName, meaning: &'static str, low: f64, high: f64, usual: Usual) -> ParameterSpec {
     ParameterSpec { name, meaning, range: [low, high], usual, words: &[] }
 }

@@ -43,13 +43,11 @@ table! {
 
 impl PlayLaw {
     /// Its name in a file.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         self.row()
     }
 
     /// Which flank carries in each row, −1 to 1, under a torque.
-    #[must_use]
     pub(crate) fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {
         // Before the first load: where the friction of a moving output puts it.
         let begun = |first: usize| -rows.direction[first] * nominal.ratio.signum();
@@ -187,13 +185,11 @@ const UNCERTAIN_AT_MOST: f64 = 0.35;
 
 impl Base {
     /// The nominal model over the rows; `table` takes the place of its parts where it is given.
-    #[must_use]
     pub fn new(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> Base {
         Base::of_laws(rows, nominal, table, &PlayLaw::ALL)
     }
 
     /// The base model with the law of the play known.
-    #[must_use]
     pub(crate) fn with_play(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, law: PlayLaw) -> Base {
         Base::of_laws(rows, nominal, table, &[law])
     }

@@ -88,7 +88,6 @@ static MENU: [Run; 6] = [
 const ONE_SPEED: f64 = 1.5;
 
 /// What to record where no look-alike asks for a run: what the data lack, or the same again.
-#[must_use]
 pub(crate) fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
     let rows = on.rows;
     let speeds = |share: f64| quantile(rows.speed.iter().map(|speed| speed.abs()).filter(|speed| *speed > 0.0), share);
@@ -119,7 +118,6 @@ pub(crate) fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
 
 /// Recording that separates n waves of the generator's encoder in a turn from those of a wheel or of the motor: half a
 /// period turns them over.
-#[must_use]
 pub(crate) fn turn_the_encoder(waves: f64) -> String {
     format!(
         "the same run with the generator's encoder turned on its shaft by {:.1} degrees, or with another one: an \
@@ -129,7 +127,6 @@ pub(crate) fn turn_the_encoder(waves: f64) -> String {
 }
 
 /// The run of the menu that tells `term` from each of `alike` best, with how far the closest then stands off.
-#[must_use]
 pub fn next(
     on: &Excitation<'_>,
     term: &Term<'_>,

@@ -35,7 +35,6 @@ pub struct Explanation<'a> {
 
 impl<'a> Explanation<'a> {
     /// Reads out of a diagnosis what it says of a cause.
-    #[must_use]
     pub fn of(diagnosis: &'a Diagnosis, cause: CauseName) -> Explanation<'a> {
         let trace = &diagnosis.trace;
         let named = diagnosis.causes.iter().find(|found| found.name == cause);
@@ -88,7 +87,6 @@ impl<'a> Explanation<'a> {
     }
 
     /// One screen.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut text = format!("{}: {}, {}\n", self.cause, self.cause.words(), self.cause.does());
         let _ = writeln!(text, "{}", self.because);
@@ -122,7 +120,6 @@ impl<'a> Explanation<'a> {
 const MOST_STEPS: usize = 6;
 
 /// `found 0.82, asked for more than 1.50`.
-#[must_use]
 pub fn numbers(judged: &Judged) -> Option<String> {
     let (value, limit) = (judged.value?, judged.limit?);
     let more = if judged.is_below { "less" } else { "more" };

@@ -31,7 +31,6 @@ pub struct FittedCause {
 
 impl FittedCause {
     /// Its name.
-    #[must_use]
     pub fn name(&self) -> CauseName {
         self.name
     }
@@ -72,7 +71,6 @@ pub struct FittedLaw {
 /// such a model cannot be evaluated on these sessions.
 ///
 /// Causes of one fit act on each other as they did in it.
-#[must_use]
 pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nominal: &Nominal) -> Option<Vec<Vec<f64>>> {
     let rows = Rows::new(sessions, nominal);
     let mut sum = vec![0.0; rows.len()];
@@ -163,7 +161,6 @@ pub struct Series {
 
 impl Series {
     /// Measured less a prediction, arcsec.
-    #[must_use]
     pub fn less(&self, predicted: &[f64]) -> Vec<f64> {
         less(&self.measured_arcsec, predicted)
     }
@@ -218,14 +215,12 @@ impl Extended {
     }
 
     /// Causes of the model.
-    #[must_use]
     pub fn causes(&self) -> &[FittedCause] {
         &self.causes
     }
 
     /// The model of a cause, fitted with `nominal`, to be evaluated on other recordings; `of` is the hash of its
     /// parameters.
-    #[must_use]
     pub(crate) fn fitted_law(&self, name: CauseName, nominal: &Nominal, of: String) -> Option<FittedLaw> {
         let cause = &self.causes.iter().find(|cause| cause.name == name)?.acting;
         let jump = |Jump { time_s: [begin, half, over], height_arcsec }: &Jump| [*begin, *half, *over, *height_arcsec];
@@ -244,7 +239,6 @@ impl Extended {
 
     /// What was found as a prediction on the rows of `sessions`, which need not be those of the fit: one series for
     /// each.
-    #[must_use]
     pub fn predict(&self, sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Vec<Series> {
         let rows = Rows::new(sessions, nominal);
         if rows.is_empty() {

@@ -21,7 +21,6 @@ const BEYOND_NOISE: f64 = 3.0;
 
 /// Rows in which the output hangs in the clearance, as it stays far short of what causes and base explain beside the
 /// nominal prediction. The noise of a row is `white`, arcsec.
-#[must_use]
 pub(crate) fn hanging(on: &Excitation<'_>, explained: &[f64], white: f64) -> Vec<bool> {
     let rows = on.rows;
     let mut hanging = vec![false; rows.len()];

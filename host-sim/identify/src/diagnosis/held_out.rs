@@ -16,7 +16,6 @@ pub(crate) struct Evaluated {
 }
 
 /// Leaves out one session after another.
-#[must_use]
 pub fn evaluate(problem: &Problem<'_>, terms: &[Term<'_>]) -> Evaluated {
     let zero = own_zero(problem, terms);
     let square = |terms: Vec<&Term<'_>>, anew| left_out(problem, &terms, anew, zero).unwrap_or(f64::NAN);

@@ -53,7 +53,6 @@ enum Extent {
 
 impl<'a> Problem<'a> {
     /// Averages and whitens.
-    #[must_use]
     pub fn new(on: Excitation<'a>, uncertain: &[bool], fineness: Fineness) -> Problem<'a> {
         let whitener = Whitener::new(on.rows, uncertain, fineness.stride, fineness.noise);
         let data = whitener.average(&on.left(&[]));
@@ -67,7 +66,6 @@ impl<'a> Problem<'a> {
     }
 
     /// Blocks of averages that are left out one at a time.
-    #[must_use]
     pub(crate) fn blocks(&self) -> &[Range<usize>] {
         &self.products.blocks
     }
@@ -79,7 +77,6 @@ impl<'a> Problem<'a> {
     }
 
     /// White columns of a model, the data last.
-    #[must_use]
     pub(crate) fn white_columns<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s [f64]> {
         self.sets(terms, further).into_iter().flat_map(|set| set.iter()).map(Vec::as_slice).collect()
     }
@@ -89,7 +86,6 @@ impl<'a> Problem<'a> {
     }
 
     /// Root mean square over the averages without uncertain rows.
-    #[must_use]
     pub(crate) fn certain_rms(&self, averaged: &[f64]) -> f64 {
         rms(&self.certain_of(averaged))
     }
@@ -136,7 +132,6 @@ impl White {
     }
 
     /// Columns.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.columns.len()
     }
@@ -190,13 +185,11 @@ pub(crate) struct Term<'l> {
 
 impl<'l> Term<'l> {
     /// Evaluates a law by itself.
-    #[must_use]
     pub fn new(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
         Term::among(problem, law, places, None, Extent::Whole)
     }
 
     /// Only its main columns.
-    #[must_use]
     pub(crate) fn main_only(&self, problem: &Problem<'_>) -> Term<'l> {
         Term::among(problem, self.law, self.places.clone(), self.among.clone(), Extent::Bare)
     }
@@ -215,7 +208,6 @@ impl<'l> Term<'l> {
     }
 
     /// This term with each normalised parameter moved, within its range and no farther than a step reaches.
-    #[must_use]
     pub fn moved(&self, problem: &Problem<'_>, mut by: impl FnMut(usize) -> f64) -> Term<'l> {
         let places = self.places.iter().zip(&self.law.shapes).enumerate().map(|(k, (place, shape))| {
             let moved = place + by(k).clamp(-FARTHEST, FARTHEST);
@@ -225,7 +217,6 @@ impl<'l> Term<'l> {
     }
 
     /// Values of the shape parameters.
-    #[must_use]
     pub fn values(&self) -> Vec<f64> {
         self.law.values(&self.places)
     }
@@ -241,19 +232,16 @@ impl<'l> Term<'l> {
     }
 
     /// Coefficients of its columns by what the columns are.
-    #[must_use]
     pub(crate) fn by_role<'c>(&'c self, coefficients: &'c [f64]) -> Coefficients<'c> {
         self.white.by_role(coefficients)
     }
 
     /// Columns.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.white.len()
     }
 
     /// What the term adds to the error, averaged.
-    #[must_use]
     pub(crate) fn contribution(&self, coefficients: &[f64]) -> Vec<f64> {
         let len = self.averaged.first().map_or(0, Vec::len);
         combined(len, self.averaged.iter().map(Vec::as_slice), coefficients)
@@ -353,7 +341,6 @@ pub(crate) struct Scaffold<'p, 'a, 't, 'l> {
 }
 
 /// Terms of laws (index) at places of their shape parameters, each on what the others leave to it.
-#[must_use]
 pub(crate) fn terms_at<'l>(problem: &Problem<'_>, laws: &'l [Law], start: &[(usize, Vec<f64>)]) -> Vec<Term<'l>> {
     among_each_other(problem, start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect())
 }
@@ -364,7 +351,6 @@ pub(super) fn but<T>(terms: &[T], k: usize) -> impl Iterator<Item = &T> {
 }
 
 /// The terms evaluated anew, each on what the others leave to it.
-#[must_use]
 pub(crate) fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l>>) -> Vec<Term<'l>> {
     let meet = |terms: &[Term<'l>]| terms.iter().any(|a| terms.iter().any(|b| a.law.acts_on(b.law)));
     // What acts on nothing here may still have been evaluated among what is no longer there.
@@ -397,20 +383,17 @@ pub(crate) struct Fit {
 
 impl Fit {
     /// Coefficients of term `k`.
-    #[must_use]
     pub fn of(&self, k: usize) -> &[f64] {
         let end = self.starts.get(k + 1).copied().unwrap_or(self.solution.coefficients.len());
         &self.solution.coefficients[self.starts[k]..end]
     }
 
     /// Coefficients of the last term.
-    #[must_use]
     pub fn last(&self) -> &[f64] {
         self.of(self.starts.len() - 1)
     }
 
     /// Coefficients of the base.
-    #[must_use]
     pub fn base(&self) -> &[f64] {
         &self.solution.coefficients[..self.starts.first().copied().unwrap_or(self.solution.coefficients.len())]
     }
@@ -432,7 +415,6 @@ fn owned_by_others(terms: &[&White], starts: &[usize], gram: &Gram) -> Vec<usize
 
 impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Of the base and some terms.
-    #[must_use]
     pub fn new(problem: &'p Problem<'a>, terms: impl IntoIterator<Item = &'t Term<'l>>) -> Self {
         let terms: Vec<&Term<'l>> = terms.into_iter().collect();
         let ahead = terms.len();
@@ -440,14 +422,12 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// What is tried has this many of the terms before it.
-    #[must_use]
     pub fn ahead(mut self, ahead: usize) -> Self {
         self.ahead = ahead;
         self
     }
 
     /// A fit of the terms, and of `further` columns, without a block of the data; and the products of that block.
-    #[must_use]
     pub fn without_block(&self, fit: &Fit, further: Option<&Set>, block: usize) -> Option<(Solution, Gram)> {
         let inside = self.problem.products.gram(&self.problem.sets(&self.terms, further), Some(block));
         let mut outside = fit.gram.clone();
@@ -456,7 +436,6 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// A law among the terms.
-    #[must_use]
     pub fn term<'n>(&self, law: &'n Law, places: Vec<f64>) -> Term<'n> {
         Term::among(self.problem, law, places, self.left_to(law), Extent::Whole)
     }
@@ -469,14 +448,12 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// The solution with a law tried at some places: with all its columns where it is `whole`, else with the main ones.
-    #[must_use]
     pub(crate) fn trial(&self, law: &Law, places: &[f64], whole: bool) -> Option<Solution> {
         let extent = if whole { Extent::Whole } else { Extent::Bare };
         Some(self.fit_with(Some(&self.white(law, extent, places)), None)?.solution)
     }
 
     /// Whether a law changes what some of the terms do, and they do not change it.
-    #[must_use]
     pub(crate) fn acted_on_by(&self, law: &Law) -> bool {
         self.terms.iter().any(|term| law.acts_on(term.law) && !law.meets(term.law))
     }
@@ -498,7 +475,6 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// Fits the terms of the scaffold and one more.
-    #[must_use]
     pub fn fit(&self, added: Option<&Term<'_>>) -> Option<Fit> {
         self.fit_with(added.map(|t| &t.white), None)
     }
@@ -541,7 +517,6 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// Places at which to begin with a law: those to be tried, or where its lead points.
-    #[must_use]
     pub fn begin(&self, law: &Law) -> Vec<Vec<f64>> {
         let mut places = self.begin_alone(law);
         let Some([phase, size]) = law.displacement_at() else { return places };
@@ -629,7 +604,6 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     }
 
     /// Moves the shape parameters of `term` to where the misfit is least, beside the terms of the scaffold.
-    #[must_use]
     pub(crate) fn refine<'n>(&self, mut term: Term<'n>) -> Option<(Term<'n>, Fit)> {
         let mut fit = self.fit(Some(&term))?;
         if term.places.is_empty() {
@@ -668,7 +642,6 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// The fit of the scaffold's terms with all their shape parameters free to first order: for uncertainties. Returns
     /// the fit, whose last coefficients are moves of the shape parameters, term after term.
-    #[must_use]
     pub(crate) fn linearised(&self) -> Option<(Fit, Set)> {
         let fit = self.fit(None)?;
         let terms = self.terms.iter().enumerate();

@@ -20,7 +20,6 @@ pub struct Noise {
 
 impl Noise {
     /// Both together, one standard deviation, arcsec.
-    #[must_use]
     pub(crate) fn floor(&self) -> f64 {
         self.white.hypot(self.wander)
     }
@@ -61,7 +60,6 @@ const UNCERTAIN_NOISE: f64 = 1e3;
 
 impl Whitener {
     /// Averages of `stride` rows under `noise`; rows marked uncertain count next to nothing.
-    #[must_use]
     pub fn new(rows: &Rows, uncertain: &[bool], stride: usize, noise: Noise) -> Whitener {
         let (mut groups, mut sessions) = (Vec::new(), Vec::new());
         for session in rows.sessions_used() {
@@ -95,13 +93,11 @@ impl Whitener {
     }
 
     /// Averages of `stride` rows under noise that is white alone, `white` arcsec in a row.
-    #[must_use]
     pub fn plain(rows: &Rows, uncertain: &[bool], stride: usize, white: f64) -> Whitener {
         Whitener::new(rows, uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 })
     }
 
     /// Blocks that are left out one at a time: sessions, or quarters of the data where there are fewer than three.
-    #[must_use]
     pub(crate) fn blocks(&self) -> Vec<std::ops::Range<usize>> {
         let sessions = &self.sessions;
         if sessions.len() >= 3 {
@@ -119,7 +115,6 @@ impl Whitener {
     }
 
     /// Averages of a column.
-    #[must_use]
     pub(crate) fn average(&self, column: &[f64]) -> Vec<f64> {
         let mut means = Vec::with_capacity(self.groups.len());
         for session in self.sessions.iter().filter(|session| !session.is_empty()) {
@@ -130,19 +125,16 @@ impl Whitener {
     }
 
     /// Whether averages take most of a column away.
-    #[must_use]
     pub(crate) fn hides(&self, column: &[f64]) -> bool {
         rms(&self.average(column)) < HIDDEN * rms(column)
     }
 
     /// Averages that no uncertain row is part of.
-    #[must_use]
     pub(crate) fn certain(&self, uncertain: &[bool]) -> Vec<bool> {
         self.groups.iter().map(|g| !uncertain[g.clone()].iter().any(|u| *u)).collect()
     }
 
     /// Values of averages back in the rows they are made of; 0 in rows of none.
-    #[must_use]
     pub(crate) fn in_rows(&self, averaged: &[f64], rows: usize) -> Vec<f64> {
         let mut values = vec![0.0; rows];
         for (group, value) in self.groups.iter().zip(averaged) {
@@ -152,14 +144,12 @@ impl Whitener {
     }
 
     /// Innovations of averaged values, in units of their standard deviation.
-    #[must_use]
     pub(crate) fn whiten_averaged(&self, averaged: &[f64]) -> Vec<f64> {
         self.whiten_abreast(&[averaged]).pop().unwrap_or_default()
     }
 
     /// Innovations of several columns of averaged values. Each value waits for the one before it, so columns go side by
     /// side.
-    #[must_use]
     pub(crate) fn whiten_each(&self, averaged: &[Vec<f64>]) -> Vec<Vec<f64>> {
         averaged.chunks(ABREAST).flat_map(|columns| self.whiten_abreast(columns)).collect()
     }
@@ -186,21 +176,18 @@ impl Whitener {
     }
 
     /// The filter's estimate of the wander in averaged values.
-    #[must_use]
     pub(crate) fn followed(&self, averaged: &[f64]) -> Vec<f64> {
         let white = self.whiten_averaged(averaged).into_iter().zip(&self.filter);
         averaged.iter().zip(white).map(|(value, (white, step))| value - step.white * white / step.weight).collect()
     }
 
     /// Sum of the logarithms of the innovations' standard deviations.
-    #[must_use]
     pub(crate) fn log_scale(&self) -> f64 {
         -self.filter.iter().map(|step| step.weight.ln()).sum::<f64>()
     }
 }
 
 /// White noise of rows, arcsec: from second differences, which no slow process and no smooth model reaches.
-#[must_use]
 pub(crate) fn white_level(rows: &Rows, left: &[f64]) -> f64 {
     let mut differences = Vec::with_capacity(left.len());
     for session in rows.sessions_used() {

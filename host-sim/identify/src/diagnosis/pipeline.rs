@@ -107,7 +107,6 @@ pub enum PipelineError {
 
 impl PipelineError {
     /// Whether the input is to blame, and not the run.
-    #[must_use]
     pub fn is_bad_input(&self) -> bool {
         match self {
             PipelineError::Calibration(error) => error.is_bad_input(),
@@ -138,7 +137,6 @@ pub struct Subject<'a> {
 
 impl<'a> Subject<'a> {
     /// A drive known from its catalogue, or extended before.
-    #[must_use]
     pub fn of_model(model: Model, drive: Drive, kind: GeneratorKind) -> Subject<'static> {
         Subject { nominal: model.nominal.clone(), table: None, model: Some(model), drive, kind, note: None }
     }
@@ -379,7 +377,6 @@ pub struct WrittenTable {
 
 impl WrittenTable {
     /// A line for a reader.
-    #[must_use]
     pub fn text(&self) -> String {
         let what = match (self.kind, &self.file) {
             (TableKind::Extended, Some(file)) => format!("that of the causes, {file}"),
@@ -427,7 +424,6 @@ pub struct Made {
 
 impl Made {
     /// The files of the tables with their contents; of each the image first.
-    #[must_use]
     pub fn table_files(&self) -> Vec<(String, Vec<u8>)> {
         let files = |(stem, made): &(String, MadeTable)| {
             let info = serde_json::to_vec_pretty(&made.info).unwrap_or_default();
@@ -457,7 +453,6 @@ pub struct DiagnosisFile<'a> {
 
 impl Diagnosed {
     /// What `diagnosis.json` holds, with what became of the causes, and the command that asked.
-    #[must_use]
     pub fn file<'a>(&'a self, extension: &'a Extension, command: &'a str) -> DiagnosisFile<'a> {
         let Recording { faults, notes, .. } = &self.recording;
         let table = &extension.table;

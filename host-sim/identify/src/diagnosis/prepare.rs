@@ -28,7 +28,6 @@ const BESIDE: usize = 12;
 const LEAST_JUMP: f64 = 1000.0;
 
 /// The nominal model over the rows, and the jumps: these are taken out before the law of the play is chosen.
-#[must_use]
 pub fn base(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> (Base, Vec<Jump>) {
     let base = Base::new(rows, nominal, table);
     let jumps = jumps(rows, &base, nominal);
@@ -56,7 +55,6 @@ pub(crate) struct Jump {
 
 impl Jump {
     /// What it has added at a time (s), arcsec: all of it from where it has half its height on.
-    #[must_use]
     pub fn reached(&self, time_s: f64) -> f64 {
         if time_s >= self.time_s[1] { self.height_arcsec } else { 0.0 }
     }
@@ -65,7 +63,6 @@ impl Jump {
 /// Where the error leaves for another level: at once, or, where that shows no whole pitches, while the wave passes
 /// (half a turn of the generator): so long teeth take to climb over each other. Where the load rings after that, the
 /// level is what it rings about.
-#[must_use]
 pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
     let left: Vec<f64> = rows.error.iter().zip(&base.prediction).map(|(e, p)| e - p).collect();
     let whole = |found: &[Jump]| {
@@ -81,7 +78,6 @@ pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
 }
 
 /// How many pitches of either wheel a jump is, if it is a whole number of them.
-#[must_use]
 pub(crate) fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
     let teeth = nominal.teeth?;
     [teeth.circular_spline, teeth.flexspline].into_iter().find_map(|count| {
@@ -162,7 +158,6 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec
 
 /// Rows whose flank is not known well, with what the causes chosen add to the load, and those in which the output
 /// `hung` in the clearance.
-#[must_use]
 pub(crate) fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<bool> {
     let mut uncertain = on.base.uncertain.clone();
     // A jump passes over some rows, and the output swings out.
@@ -238,7 +233,6 @@ const MOST_SET_ASIDE: f64 = 0.5;
 
 /// Why the rows that count say nothing of the unit, if too few of them do. What was found in spite of that is the
 /// trouble itself, and stands as long as there are rows to judge it by.
-#[must_use]
 pub(crate) fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<String> {
     let rows = problem.on.rows;
     let used = rows.count_used();
@@ -299,7 +293,6 @@ pub(crate) struct FreeColumns {
 
 impl FreeColumns {
     /// Main columns of laws, at some places of their shape parameters, averaged over whole averages of `finest` rows.
-    #[must_use]
     pub fn of(on: &Excitation<'_>, laws: &[Law], finest: usize) -> FreeColumns {
         let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
         let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
@@ -345,7 +338,6 @@ fn directions(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by
 /// its evidence with the main columns of all laws as free columns. Returns also the worth of the information: below 1
 /// where innovations are not white. `explained` is what is explained already, row by row.
-#[must_use]
 pub fn noise(on: &Excitation<'_>, columns: &FreeColumns, explained: &[f64], uncertain: &[bool]) -> (Noise, f64) {
     let rows = on.rows;
     let left = on.left(explained);

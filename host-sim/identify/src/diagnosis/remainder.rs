@@ -40,7 +40,6 @@ fn columns(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Vec<f64>> {
 }
 
 /// The part of the error that base and terms explain in addition to the nominal prediction, row by row, arcsec.
-#[must_use]
 pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     let columns = columns(problem, selected);
     combined(problem.on.rows.len(), columns.iter().map(Vec::as_slice), &selected.fit.solution.coefficients)
@@ -60,7 +59,6 @@ fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Ve
 
 /// The strongest lines of the residual by generator angle and by time that are no noise, in every row: averages would
 /// hide the fast ones.
-#[must_use]
 pub(crate) fn lines(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<SpectralLine> {
     let (rows, every) = (problem.on.rows, every_row(problem, selected, noise));
     let count = every.len() as f64;
@@ -81,7 +79,6 @@ pub(crate) fn lines(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
 
 /// Where an encoder lost its index, in what is left beside what is `explained`, of rows that are not `uncertain`: the
 /// session, and when in it, s.
-#[must_use]
 pub(crate) fn step(
     problem: &Problem<'_>,
     selected: &Selected<'_>,
@@ -131,7 +128,6 @@ fn time_without_gaps(rows: &Rows) -> Vec<f64> {
 }
 
 /// Whether averaging the rows takes most of a line away.
-#[must_use]
 pub(crate) fn averaged_away(problem: &Problem<'_>, line: &SpectralLine) -> bool {
     let places = places(problem.on.rows, line.per);
     let wave: Vec<f64> = places.iter().map(|angle| (line.order * angle).cos()).collect();
@@ -139,7 +135,6 @@ pub(crate) fn averaged_away(problem: &Problem<'_>, line: &SpectralLine) -> bool 
 }
 
 /// Residual that goes as a free function of a measured quantity, largest first.
-#[must_use]
 pub(crate) fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], white: f64) -> Vec<Unexplained> {
     use rayon::prelude::*;
     let scaffold = Scaffold::new(problem, &selected.terms);
@@ -166,7 +161,6 @@ pub(crate) fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[La
 }
 
 /// Slow motion that is too large for noise, or too orderly.
-#[must_use]
 pub(crate) fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Unexplained> {
     let left = left(problem, selected);
     let wander = problem.whitener.followed(&left);
@@ -182,7 +176,6 @@ pub(crate) fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise
 }
 
 /// Data less everything explained, averaged, arcsec.
-#[must_use]
 pub fn left(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     less(&problem.data, &selected.predicted(problem))
 }

@@ -46,7 +46,6 @@ pub enum Finding {
 
 impl Finding {
     /// What follows from a verdict, as long as the data are usable.
-    #[must_use]
     pub const fn of(verdict: Verdict) -> Finding {
         match verdict {
             Verdict::None => Finding::NothingFound,
@@ -56,7 +55,6 @@ impl Finding {
     }
 
     /// For a reader.
-    #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
             Finding::FaultFound => "fault found",
@@ -177,14 +175,12 @@ pub struct Compensation {
 
 impl Compensation {
     /// The least that is left without a table, with the nominal and with the calibrated one, arcsec.
-    #[must_use]
     pub(super) fn without_causes_arcsec(&self) -> f64 {
         let calibrated = self.rms_calibrated_table_arcsec.unwrap_or(f64::INFINITY);
         self.rms_uncompensated_arcsec.min(self.rms_nominal_tables_arcsec).min(calibrated)
     }
 
     /// Whether it was evaluated: no data are without any error.
-    #[must_use]
     pub fn is_known(&self) -> bool {
         self.rms_uncompensated_arcsec > 0.0
     }
@@ -323,7 +319,6 @@ impl Diagnosis {
     }
 
     /// The sets of causes that the data do not decide between, with their odds; causes by `name`.
-    #[must_use]
     pub fn open_between(&self, name: fn(CauseName) -> &'static str) -> Option<String> {
         let least = OPEN * self.posterior.first()?.probability;
         let of_set = |of: &SetOfCauses| {
@@ -340,7 +335,6 @@ impl Diagnosis {
     }
 
     /// A few lines for a terminal.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut text = String::new();
         let verdict = match self.verdict {

@@ -22,7 +22,6 @@ const OUTLIER: f64 = 5.0;
 /// What laws explain, row by row, arcsec, that averages of `stride` rows would hide and the data hold: then every row
 /// is needed. Rows marked uncertain are not looked at; `explained` is what is explained already, row by row, arcsec
 /// (nothing if it is empty).
-#[must_use]
 pub(crate) fn hidden_by_averages(
     on: &Excitation<'_>,
     laws: &[Law],

@@ -48,7 +48,6 @@ pub(crate) type OnSample<'a> = Option<(Problem<'a>, f64)>;
 
 /// Rivals of term `k`, whose contribution is `size` arcsec rms, closest first. With a sample only those that are near
 /// there are refitted to all rows.
-#[must_use]
 pub(super) fn rivals<'l>(
     Search { problem, laws, bests, .. }: &'l Search<'_>,
     sample: &OnSample<'_>,

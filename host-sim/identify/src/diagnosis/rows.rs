@@ -93,7 +93,6 @@ pub struct Rows {
 
 impl Rows {
     /// Joins sessions; all are learnt from, but for those of three rows or fewer.
-    #[must_use]
     pub fn new(sessions: &[Session], nominal: &Nominal) -> Rows {
         let mut rows = Rows::default();
         let all = |has: fn(&Session) -> bool| sessions.iter().all(has) && !sessions.is_empty();
@@ -177,7 +176,6 @@ impl Rows {
     }
 
     /// Learns from these sessions alone, as far as they have rows enough.
-    #[must_use]
     pub(crate) fn learning_from(mut self, used: &[bool]) -> Rows {
         for (k, session) in self.used.iter_mut().enumerate() {
             *session &= used.get(k).copied().unwrap_or(false);
@@ -186,7 +184,6 @@ impl Rows {
     }
 
     /// With each column changed by `of`; the sessions are these then.
-    #[must_use]
     pub fn each(&self, sessions: Vec<Range<usize>>, of: impl Fn(&[f64]) -> Vec<f64>) -> Rows {
         Rows {
             sessions,
@@ -221,7 +218,6 @@ impl Rows {
 
     /// Highest order per turn of the generator of which half of the rows that move see a period or more in two: beyond,
     /// a wave is on these rows what one of a lower order is, or a constant.
-    #[must_use]
     pub(crate) fn highest_order(&self) -> f64 {
         let steps = self.sessions_used().flat_map(|session| {
             self.generator[session].windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<f64>>()
@@ -230,7 +226,6 @@ impl Rows {
     }
 
     /// Rows that are learnt from.
-    #[must_use]
     pub(crate) fn count_used(&self) -> usize {
         self.sessions_used().map(|session| session.len()).sum()
     }
@@ -269,13 +264,11 @@ impl Rows {
     }
 
     /// Rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.generator.len()
     }
 
     /// Whether there are no rows.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.generator.is_empty()
     }
@@ -306,7 +299,6 @@ impl Rows {
     }
 
     /// A high percentile of the torque's magnitude, N·m: the scale of the load.
-    #[must_use]
     pub(crate) fn load_scale(&self) -> f64 {
         quantile(self.torque.iter().map(|t| t.abs()), 0.98)
     }

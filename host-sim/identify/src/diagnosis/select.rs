@@ -41,7 +41,6 @@ pub(crate) struct Selected<'l> {
 
 impl<'l> Selected<'l> {
     /// These terms, fitted.
-    #[must_use]
     pub fn of(problem: &Problem<'_>, terms: Vec<Term<'l>>) -> Option<Selected<'l>> {
         let fit = Scaffold::new(problem, &terms).fit(None)?;
         Some(Selected { terms, fit })
@@ -63,14 +62,12 @@ impl<'l> Selected<'l> {
     }
 
     /// Prediction beside the nominal one, averaged.
-    #[must_use]
     pub fn predicted(&self, problem: &Problem<'_>) -> Vec<f64> {
         let columns = problem.base.iter().chain(self.terms.iter().flat_map(|term| term.averaged.iter()));
         super::rows::combined(problem.data.len(), columns.map(Vec::as_slice), &self.fit.solution.coefficients)
     }
 
     /// The selection without term `k`, the others as they are then, fitted.
-    #[must_use]
     pub fn without(&self, problem: &Problem<'_>, k: usize) -> Option<Selected<'l>> {
         let mut others = self.terms.clone();
         let gone = others.remove(k);
@@ -263,7 +260,6 @@ fn best_tried<'l>(
 }
 
 /// What each term adds that the others cannot, and what it is worth on sessions left out.
-#[must_use]
 pub(crate) fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing> {
     (0..selected.terms.len()).map(|k| standing(problem, selected, k)).collect()
 }
@@ -304,7 +300,6 @@ pub(super) fn about_mean(problem: &Problem<'_>, mut values: Vec<f64>) -> Vec<f64
 }
 
 /// Size of an addition to the prediction.
-#[must_use]
 pub fn size_of(problem: &Problem<'_>, added: &[f64]) -> f64 {
     let used = problem.certain_of(added);
     let high = super::rows::quantile(used.iter().map(|v| v.abs()), 0.97);
@@ -353,7 +348,6 @@ pub(super) fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<J
 }
 
 /// Least size of anything that counts, arcsec, at this white noise.
-#[must_use]
 pub(crate) fn least_size(white: f64) -> f64 {
     LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
 }
@@ -457,7 +451,6 @@ pub(crate) struct Chooser<'c, 'a, 'l> {
 
 impl<'l> Chooser<'_, '_, 'l> {
     /// Chooses causes, beginning with some terms.
-    #[must_use]
     pub fn select(mut self, start: Vec<Term<'l>>) -> Option<Selected<'l>> {
         let problem = self.problem;
         let mut selected = Selected::of(problem, start)?;

@@ -31,7 +31,6 @@ pub(crate) struct Thinned {
 
 impl Thinned {
     /// A sample, of which `stride` rows at a time are averaged; none where there are few rows.
-    #[must_use]
     pub fn of(on: &Excitation<'_>, stride: usize) -> Option<Thinned> {
         let ratio = on.rows.count_used().div_ceil(ROWS);
         if ratio < LEAST_RATIO {
@@ -64,7 +63,6 @@ impl Thinned {
     }
 
     /// The sample as models are fitted to it, where these of all rows are uncertain.
-    #[must_use]
     pub fn problem<'a>(&'a self, on: &Excitation<'a>, uncertain: &[bool], fineness: Fineness) -> Problem<'a> {
         let uncertain: Vec<bool> = self.kept.iter().map(|k| uncertain[*k]).collect();
         Problem::new(on.over(&self.rows, &self.base), &uncertain, fineness)

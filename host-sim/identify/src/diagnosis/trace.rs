@@ -36,7 +36,6 @@ table! {
 
 impl Stage {
     /// Its words for a reader.
-    #[must_use]
     pub const fn words(self) -> &'static str {
         self.row()
     }
@@ -98,7 +97,6 @@ table! {
 
 impl Gate {
     /// What it asks, as a sentence of which the law is the subject.
-    #[must_use]
     pub const fn asks(self) -> &'static str {
         self.row()
     }
@@ -122,26 +120,22 @@ pub struct Judged {
 
 impl Judged {
     /// The value has to be above the limit.
-    #[must_use]
     pub fn above(gate: Gate, value: f64, limit: f64) -> Judged {
         Judged { gate, value: Some(value), limit: Some(limit), is_below: false, passed: value > limit }
     }
 
     /// The value has to be below the limit.
-    #[must_use]
     pub fn below(gate: Gate, value: f64, limit: f64) -> Judged {
         Judged { is_below: true, passed: value < limit, ..Judged::above(gate, value, limit) }
     }
 
     /// A value that is no number.
-    #[must_use]
     pub fn plain(gate: Gate, passed: bool) -> Judged {
         Judged { gate, value: None, limit: None, is_below: false, passed }
     }
 }
 
 /// Whether all gates let it through.
-#[must_use]
 pub(crate) fn passed(gates: &[Judged]) -> bool {
     gates.iter().all(|judged| judged.passed)
 }
@@ -163,13 +157,11 @@ pub struct Decision {
 
 impl Decision {
     /// Whether all gates let it through.
-    #[must_use]
     pub fn passed(&self) -> bool {
         passed(&self.gates)
     }
 
     /// The gate that decided: the first that did not let it through, or the last of those that did.
-    #[must_use]
     pub fn deciding(&self) -> Option<&Judged> {
         self.gates.iter().find(|judged| !judged.passed).or(self.gates.last())
     }
@@ -196,7 +188,6 @@ impl Trace {
 
     /// The decision that says why a cause was not named: of the last stage that it came to, the one of the law that
     /// came farthest. None if all gates let it through to the end.
-    #[must_use]
     pub fn stopped(&self, cause: CauseName) -> Option<&Decision> {
         let search = |step: &&Decision| step.stage != Stage::Rival;
         let last = self.of(cause).rev().find(search)?;

@@ -149,7 +149,6 @@ fn by_noise(fit: &Fit, covariance: &[f64]) -> Vec<f64> {
 }
 
 /// How well each term is known, where `beyond` times the noise is left.
-#[must_use]
 pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec<Known> {
     let terms: Vec<&Term<'_>> = selected.terms.iter().collect();
     let scaffold = Scaffold::new(problem, &selected.terms);

@@ -102,7 +102,6 @@ impl Evaluation {
 
 /// Cuts sessions into those to learn from (true) and those held out: every second one; with fewer than three sessions
 /// every third of their parts.
-#[must_use]
 pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
     if sessions.len() >= FEWEST_SESSIONS {
         return (sessions.to_vec(), (0..sessions.len()).map(|k| k % 2 == 0).collect());
@@ -116,7 +115,6 @@ pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
 }
 
 /// Measured less predicted by the core, arcsec, row by row.
-#[must_use]
 pub fn left_by_core(table: &Table<'_>, session: &Session, temperature_c: f64) -> Vec<f64> {
     let said = by_core(table, session.states(temperature_c));
     let left = |(error, said): (&f64, Prediction)| (error - f64::from(said.transmission_error_rad)) * ARCSEC_PER_RAD;

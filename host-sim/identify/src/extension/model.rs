@@ -147,7 +147,6 @@ impl Model {
     }
 
     /// The file.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         let n = &self.nominal;
         let drive = match n.teeth {
@@ -270,7 +269,6 @@ impl CauseEntry {
     }
 
     /// The effect that simulates it, if there is one.
-    #[must_use]
     pub fn effect(&self) -> Option<Effect> {
         self.checked_effect().ok()
     }

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use super::{Looked, Role, TimeKind};
 
 /// The result as text.
-#[must_use]
 pub fn text(looked: &Looked) -> String {
     let mut text = String::new();
     let decimals = if looked.decimal_comma { ", decimal commas" } else { "" };

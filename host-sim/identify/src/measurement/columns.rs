@@ -157,7 +157,6 @@ impl ColumnMap {
     }
 
     /// Counts in a turn of the output's encoder, negative where they fall as its angle rises, if its unit says so.
-    #[must_use]
     pub fn counts_of_output(&self) -> Option<f64> {
         let reading = self.given(Quantity::Output)?.reading?;
         (reading.unit == Unit::Count).then(|| reading.gain.recip())

@@ -53,13 +53,11 @@ table! {
 
 impl FaultName {
     /// Its name in files, snake case.
-    #[must_use]
     pub const fn as_str(self) -> &'static str {
         self.row().0
     }
 
     /// The change at the bench or in the logger by which it does not come back.
-    #[must_use]
     pub const fn advice(self) -> &'static str {
         self.row().1
     }

@@ -110,19 +110,16 @@ impl Session {
     }
 
     /// Rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.generator_rad.len()
     }
 
     /// Whether there are no rows.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.generator_rad.is_empty()
     }
 
     /// Output angle, rad.
-    #[must_use]
     pub fn output_rad(&self, ratio: f64) -> Vec<f64> {
         self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
     }

@@ -52,7 +52,6 @@ impl Definition {
 const CAME_LATER: [ParameterName; 1] = [ParameterName::DeeperArcsec];
 
 /// Everything that can be asked for: the causes of the library, then data faults.
-#[must_use]
 pub fn effects() -> Vec<Definition> {
     let causes = CauseName::ALL.iter().map(|cause| Definition::of_cause(*cause));
     causes.chain(FAULTS.iter().map(Definition::of_fault)).collect()
@@ -177,7 +176,6 @@ impl Effect {
     }
 
     /// The value of a parameter, if it has one.
-    #[must_use]
     pub fn given(&self, name: ParameterName) -> Option<f64> {
         self.values.get(&name).copied()
     }

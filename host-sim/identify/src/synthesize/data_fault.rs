@@ -182,7 +182,6 @@ fn from_an_instant(rows: &mut Cells, v: &dyn Fn(Name) -> f64, column: usize, mor
 }
 
 /// The rows as CSV text, with the faults among `effects` in them. `ratio` makes output angles of errors.
-#[must_use]
 pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut fastrand::Rng) -> String {
     let mut rows = Cells::new();
     for session in sessions {

@@ -21,7 +21,6 @@ pub struct MotionPlan {
 
 /// Motion like that of measured sessions, all columns there. What was not recorded is taken as rows `1 / rate_hz`
 /// apart, no load, the nominal temperature and no turn against gravity. A session of one row has no motion.
-#[must_use]
 pub fn completed(sessions: &[Session], rate_hz: f64, temperature_c: f64) -> Vec<Session> {
     // A session without time begins a while after the one before.
     let mut begin = 0.0;
@@ -56,7 +55,6 @@ const MADE_UP_C: [f64; 2] = [-43.0, 63.0];
 
 impl MotionPlan {
     /// Makes up a run.
-    #[must_use]
     pub fn excite(&self, random: &mut fastrand::Rng) -> Vec<Session> {
         let mut clock = 0.0;
         let dt = 1.0 / self.rate_hz;

@@ -64,7 +64,6 @@ const PLAY: PlayLaw = PlayLaw::Pushed;
 const WORST_UNIT: f64 = 2.5;
 
 /// A catalogue drive to hide effects in.
-#[must_use]
 pub fn catalogue_drive() -> Nominal {
     Nominal::from_toml(
         "built in",
@@ -87,7 +86,6 @@ pub struct Sizes {
 
 impl Sizes {
     /// Those of a drive.
-    #[must_use]
     pub fn of(drive: &Drive) -> Sizes {
         let wheel = &drive.circular_spline;
         Sizes { pitch_radius_mm: wheel.pitch_radius_mm(), base_radius_mm: wheel.base_radius_mm() }
@@ -112,13 +110,11 @@ pub struct DrawnUnit {
 
 impl DrawnUnit {
     /// The drawing.
-    #[must_use]
     pub fn nominal(nominal: &Nominal) -> DrawnUnit {
         DrawnUnit { wind_up: 1.0, clearance: 1.0, drive: nominal.clone(), zero_arcsec: 0.0 }
     }
 
     /// Draws a unit.
-    #[must_use]
     pub fn draw(nominal: &Nominal, random: &mut fastrand::Rng) -> DrawnUnit {
         let spread = nominal.spread;
         let mut limited = || gauss(random).clamp(-WORST_UNIT, WORST_UNIT);

@@ -51,7 +51,6 @@ impl Chain {
     /// Factorises the sum of contributions over these blocks each; false when a block has not its sign. Each is asked
     /// for when the first of its blocks is eliminated, and gives its symmetric matrix, column-major, of which the lower
     /// triangle is read, or is refused.
-    #[must_use]
     pub fn factorise(
         &mut self,
         blocks: &[ChainBlock],

@@ -95,14 +95,12 @@ impl BorderedSystem {
 
     /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is
     /// singular.
-    #[must_use]
     pub(crate) fn solve(&self, factor: &mut (impl Factor + ?Sized), f: &mut [f64], g: &mut [f64]) -> bool {
         factor.solve(f, 1);
         self.complete(f, g)
     }
 
     /// Solves in place from `A^-1 f` in place of f.
-    #[must_use]
     pub(crate) fn complete(&self, f: &mut [f64], g: &mut [f64]) -> bool {
         let n = f.len();
         for (gi, column) in g.iter_mut().zip(&self.columns) {
@@ -120,7 +118,6 @@ impl BorderedSystem {
     }
 
     /// z alone, for f = 0, in place of g.
-    #[must_use]
     pub(crate) fn solve_border(&self, g: &mut [f64]) -> bool {
         solve_dense(&mut self.schur.clone(), g, self.columns.len())
     }

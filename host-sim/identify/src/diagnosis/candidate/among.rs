@@ -45,7 +45,6 @@ pub(super) const STIFFNESS: &str = "stiffness";
 impl Law {
     /// Whether this cause changes what another one does. Two that meet in the zones act on each other: the order
     /// decides.
-    #[must_use]
     pub(crate) fn acts_on(&self, other: &Law) -> bool {
         // A spring that is out of tolerance is one under the torque recorded.
         self.is_load() && !other.is_load() && other.acts.tolerance_of != Some(STIFFNESS)
@@ -53,7 +52,6 @@ impl Law {
     }
 
     /// Whether two act on each other.
-    #[must_use]
     pub(crate) fn meets(&self, other: &Law) -> bool {
         self.acts.meets_zones && other.acts.meets_zones
     }
@@ -61,7 +59,6 @@ impl Law {
 
 impl Among {
     /// The excitation that `acting` causes leave; nothing where none of them does anything to others.
-    #[must_use]
     pub fn of(on: &Excitation<'_>, acting: &[Acting<'_>]) -> Option<Among> {
         let mut among = Among { loaded: None, widened: None, zones: None };
         for cause in acting {
@@ -94,7 +91,6 @@ impl Among {
     }
 
     /// The excitation as it is left.
-    #[must_use]
     pub(crate) fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
         let (rows, base) = self.loaded.as_ref().map_or((on.rows, on.base), |(rows, base)| (rows, base));
         Excitation { rows, base, widened: self.widened.as_deref(), zones: self.zones.as_ref(), ..*on }
@@ -102,7 +98,6 @@ impl Among {
 }
 
 /// The excitation as others leave it, or as it was recorded.
-#[must_use]
 pub(crate) fn left_by<'a>(among: Option<&'a Among>, on: &Excitation<'a>) -> Excitation<'a> {
     among.map_or(*on, |among| among.excitation(on))
 }
@@ -117,7 +112,6 @@ fn half_width(on: &Excitation<'_>, cause: &Acting<'_>) -> Vec<f64> {
 }
 
 /// Columns of causes that are there together, in their order.
-#[must_use]
 pub(crate) fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Regressor>> {
     (0..causes.len())
         .map(|k| {

@@ -110,7 +110,6 @@ pub fn index_step(session: usize, since_s: f64) -> Law {
 }
 
 /// A line at any order of an angle or of time: `per` is what it is counted against.
-#[must_use]
 pub fn line(per: Per, order: f64) -> Law {
     let label = Label::Line { per, order };
     let of_angle = |of: Angle| Law::new(label, move |on, _| waves(on, of, order).map(|wave| main(wave, 15.0)).into());
@@ -134,7 +133,6 @@ pub fn line(per: Per, order: f64) -> Law {
 type Offset = fn(&Excitation<'_>, usize) -> f64;
 
 /// Everything without a name that is always tried.
-#[must_use]
 pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     let (warm, timed, loaded) = (on.rows.recorded.temperature, on.rows.recorded.time, on.scales.load > 0.0);
     let offsets: [(bool, &'static str, Offset); 12] = [
@@ -206,7 +204,6 @@ fn map(name: &'static str, grids: Vec<(Vec<f64>, usize)>) -> Law {
 
 /// The residual as a free function of measured quantities: tried only when the causes are in, to see whether anything
 /// is left.
-#[must_use]
 pub(crate) fn maps(on: &Excitation<'_>) -> Vec<Law> {
     let rows = on.rows;
     let (warm, timed, loaded) = (rows.recorded.temperature, rows.recorded.time, on.scales.load > 0.0);

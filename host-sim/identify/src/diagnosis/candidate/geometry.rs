@@ -212,7 +212,6 @@ fn standing(nominal: &Nominal) -> Angle {
 }
 
 /// The pitch error of the wheel that stands.
-#[must_use]
 pub(crate) fn standing_pitch_error(nominal: &Nominal) -> CauseName {
     match standing(nominal) {
         Angle::CircularSpline => CauseName::CircularSplinePitchError,

@@ -78,7 +78,6 @@ impl From<&'static str> for Label {
 
 impl Label {
     /// The cause, if it is one.
-    #[must_use]
     pub const fn cause(self) -> Option<CauseName> {
         match self {
             Label::Cause(cause) => Some(cause),

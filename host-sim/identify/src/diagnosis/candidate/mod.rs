@@ -82,19 +82,16 @@ const UNLOADED_ARCSEC: f64 = 20.0;
 
 impl<'a> Excitation<'a> {
     /// The recorded one.
-    #[must_use]
     pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a LawUnits) -> Excitation<'a> {
         Excitation { rows, nominal, base, scales, widened: None, zones: None }
     }
 
     /// Other rows, with the nominal model over them, and nothing that other causes change.
-    #[must_use]
     pub(crate) fn over(&self, rows: &'a Rows, base: &'a Base) -> Excitation<'a> {
         Excitation { rows, base, ..*self }
     }
 
     /// The error less what is predicted and what is `explained` already (nothing if it is empty), row by row, arcsec.
-    #[must_use]
     pub(crate) fn left(&self, explained: &[f64]) -> Vec<f64> {
         let explained = explained.iter().chain(std::iter::repeat(&0.0));
         let predicted = self.base.prediction.iter().zip(explained);
@@ -102,13 +99,11 @@ impl<'a> Excitation<'a> {
     }
 
     /// Whether the output is not loaded beyond friction, which then says nothing of the flank that carries.
-    #[must_use]
     pub(crate) fn unloaded(&self) -> bool {
         self.scales.load < self.nominal.friction_torque_n_m
     }
 
     /// The first need of a cause that these data do not meet.
-    #[must_use]
     pub(crate) fn lacks(&self, cause: CauseName) -> Option<Need> {
         cause.spec().needs.iter().copied().find(|need| !self.meets(*need))
     }
@@ -196,7 +191,6 @@ pub struct LawUnits {
 
 impl LawUnits {
     /// Of these rows.
-    #[must_use]
     pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<Jump>) -> LawUnits {
         let (mut moving, mut turned) = (0usize, 0.0);
         for speed in rows.speed.iter().filter(|speed| **speed != 0.0) {
@@ -245,14 +239,12 @@ impl Shape {
     }
 
     /// The value at a place between 0 and 1.
-    #[must_use]
     pub fn value(&self, place: f64) -> f64 {
         let place = if self.cyclic { place.rem_euclid(1.0) } else { place.clamp(0.0, 1.0) };
         if self.log { self.low * (self.high / self.low).powf(place) } else { self.low + (self.high - self.low) * place }
     }
 
     /// The place of a value.
-    #[must_use]
     pub fn place(&self, value: f64) -> f64 {
         if self.log {
             ((value.max(1e-300) / self.low).ln() / (self.high / self.low).ln()).clamp(0.0, 1.0)
@@ -298,7 +290,6 @@ impl Regressor {
     }
 
     /// The column with a role.
-    #[must_use]
     fn called(self, role: Tag) -> Regressor {
         Regressor { role, ..self }
     }
@@ -461,18 +452,15 @@ impl Law {
         }
     }
     /// The cause it is about; none for a deviation without one.
-    #[must_use]
     pub(crate) const fn cause(&self) -> Option<CauseName> {
         self.label.cause()
     }
     /// Whether it is about a cause of the library.
-    #[must_use]
     pub const fn named(&self) -> bool {
         self.cause().is_some()
     }
     /// Whether it is the bench's zero in each session: what nobody can foretell of a session, and what says nothing of
     /// the drive.
-    #[must_use]
     pub(crate) const fn is_zero_of_sessions(&self) -> bool {
         !self.wrong.foretells && !matches!(self.label, Label::Fault { .. })
     }
@@ -481,7 +469,6 @@ impl Law {
         matches!(self.label, Label::Fault { .. }) || self.is_zero_of_sessions()
     }
     /// Whether it is about this cause.
-    #[must_use]
     pub fn is(&self, cause: CauseName) -> bool {
         self.cause() == Some(cause)
     }
@@ -555,13 +542,11 @@ impl Law {
     }
 
     /// Columns at values of the shape parameters.
-    #[must_use]
     pub(crate) fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Regressor> {
         (self.columns)(on, self.shaped(values))
     }
 
     /// Columns of the lead at values of the shape parameters; those of the law where it has no lead.
-    #[must_use]
     pub(crate) fn lead_columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Regressor> {
         match &self.search.lead {
             Some(lead) => (lead.columns)(on, self.shaped(values)),
@@ -571,63 +556,53 @@ impl Law {
 
     /// Values of the shape parameters to begin with, from those tried and the coefficients of the columns of the lead;
     /// nothing without a lead.
-    #[must_use]
     pub(crate) fn beginnings(&self, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Vec<f64>> {
         let lead = self.search.lead.as_ref();
         lead.map_or_else(Vec::new, |lead| (lead.beginnings)(self.shaped(values), coefficients))
     }
 
     /// Parameters for the report.
-    #[must_use]
     pub(crate) fn parameters(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Named> {
         (self.parameters)(on, self.shaped(values), coefficients)
     }
 
     /// Whether shape parameters and coefficients make sense, signs above all.
-    #[must_use]
     pub(crate) fn physical(&self, values: &[f64], coefficients: Coefficients<'_>) -> bool {
         (self.physical)(self.shaped(values), coefficients)
     }
 
     /// Load (N·m, row by row) that the cause adds to the torque that was recorded, if it adds any.
-    #[must_use]
     pub fn load(&self, on: &Excitation<'_>, values: &[f64]) -> Option<Vec<f64>> {
         self.acts.load.as_ref().map(|load| load(on, self.shaped(values)))
     }
 
     /// Whether it adds a load.
-    #[must_use]
     pub(crate) fn is_load(&self) -> bool {
         self.acts.load.is_some()
     }
 
     /// How far it brings one zone of teeth ahead of the other, if it does.
-    #[must_use]
     pub(crate) fn zones(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Option<Zones> {
         self.acts.zones.as_ref().map(|apart| apart(on, self.shaped(values), coefficients))
     }
 
     /// Which of the shape parameters has this name.
-    #[must_use]
     pub(crate) fn shape_at(&self, name: ParameterName) -> Option<usize> {
         self.shapes.iter().position(|shape| shape.name == name)
     }
 
     /// Which of the shape parameters are the direction and the size of a displacement, if it is one.
-    #[must_use]
     pub(crate) fn displacement_at(&self) -> Option<[usize; 2]> {
         Some([self.shape_at(ParameterName::PhaseRad)?, self.shape_at(ParameterName::SizeArcsec)?])
     }
 
     /// Places of the shape parameters as another law has those of the same name; in the middle where it has none.
-    #[must_use]
     pub(crate) fn places_like(&self, other: &Law, places: &[f64]) -> Vec<f64> {
         let of = |shape: &Shape| other.shape_at(shape.name).and_then(|at| places.get(at)).copied().unwrap_or(0.5);
         self.shapes.iter().map(of).collect()
     }
 
     /// How much of its size another law may be named for wrongly.
-    #[must_use]
     pub(crate) fn misfit_as(&self, other: &Law) -> f64 {
         if !other.named() {
             return self.wrong.misfit.max(self.wrong.misfit_unnamed);
@@ -636,19 +611,16 @@ impl Law {
     }
 
     /// Values of the shape parameters at places between 0 and 1.
-    #[must_use]
     pub fn values(&self, places: &[f64]) -> Vec<f64> {
         self.shapes.iter().zip(places).map(|(shape, place)| shape.value(*place)).collect()
     }
 
     /// Places of values of the shape parameters.
-    #[must_use]
     pub fn places(&self, values: &[f64]) -> Vec<f64> {
         self.shapes.iter().zip(values).map(|(shape, value)| shape.place(*value)).collect()
     }
 
     /// All combinations of places tried first.
-    #[must_use]
     pub(crate) fn tried(&self) -> Vec<Vec<f64>> {
         let mut tried = vec![Vec::new()];
         for shape in &self.shapes {
@@ -664,7 +636,6 @@ impl Law {
 }
 
 /// Every law of every cause that the data can speak about.
-#[must_use]
 pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     CauseName::ALL
         .iter()

@@ -27,13 +27,11 @@ pub struct Coefficients<'c> {
 
 impl<'c> Coefficients<'c> {
     /// Coefficients of columns of these roles.
-    #[must_use]
     pub fn new(roles: &'c [Tag], values: &'c [f64]) -> Coefficients<'c> {
         Coefficients { roles, values, sizes: None }
     }
 
     /// With the root mean squares of the columns, as many as there are roles.
-    #[must_use]
     pub(crate) fn of_sizes(self, sizes: &'c [f64]) -> Coefficients<'c> {
         Coefficients { sizes: Some(sizes), ..self }
     }
@@ -44,14 +42,12 @@ impl<'c> Coefficients<'c> {
     }
 
     /// That of the first column of a role. What has no column adds nothing: 0.
-    #[must_use]
     pub fn of(self, role: Tag) -> f64 {
         self.all(role).next().unwrap_or(0.0)
     }
 
     /// Root mean square of the part of the first column of a role, without a sign: 0 where the law has no such column
     /// here. Where the columns are not known all are taken to be alike.
-    #[must_use]
     pub(crate) fn adds(self, role: Tag) -> f64 {
         let Some(at) = self.roles.iter().position(|of| *of == role) else { return 0.0 };
         let size = self.sizes.and_then(|sizes| sizes.get(at)).copied().unwrap_or(1.0);
@@ -59,7 +55,6 @@ impl<'c> Coefficients<'c> {
     }
 
     /// Those of the cosine and the sine of a wave; 0 where the law has no such wave here.
-    #[must_use]
     pub fn wave(self, role: Tag) -> [f64; 2] {
         let mut both = self.all(role);
         [0, 1].map(|_| both.next().unwrap_or(0.0))
@@ -75,13 +70,11 @@ pub struct Shaped<'s> {
 
 impl<'s> Shaped<'s> {
     /// Values of these shape parameters.
-    #[must_use]
     pub fn new(shapes: &'s [Shape], values: &'s [f64]) -> Shaped<'s> {
         Shaped { shapes, values }
     }
 
     /// The value of a shape parameter, if the law has it here.
-    #[must_use]
     pub fn get(self, name: ParameterName) -> Option<f64> {
         self.shapes.iter().zip(self.values).find(|(shape, _)| shape.name == name).map(|(_, value)| *value)
     }
@@ -90,13 +83,11 @@ impl<'s> Shaped<'s> {
     ///
     /// # Panics
     /// The law has none of this name.
-    #[must_use]
     pub fn of(self, name: ParameterName) -> f64 {
         self.get(name).unwrap_or_else(|| panic!("a law asks for {name}, which is none of its shape parameters"))
     }
 
     /// All values, with some of them changed.
-    #[must_use]
     pub fn with(self, changed: &[(ParameterName, f64)]) -> Vec<f64> {
         let new = |name: ParameterName| changed.iter().find(|(n, _)| *n == name).map(|(_, value)| *value);
         self.shapes.iter().zip(self.values).map(|(shape, value)| new(shape.name).unwrap_or(*value)).collect()

@@ -46,7 +46,6 @@ table! {
 
 impl Separator {
     /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         self.row().0
     }
