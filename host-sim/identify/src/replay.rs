@@ -3,11 +3,8 @@
 //! The rows are read and checked as those of a calibration ([`crate::known_rows`]), and whatever was converted or left
 //! out is reported. Without a torque the table is read at 0 N·m.
 
-use std::path::Path;
-
 use flexspline::{GeneratorAngle, PlayState, Prediction, Quality, Table};
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde::Serialize;
 
 use crate::calibrate::{CalibrationFile, INSIDE, MOST_ERROR_RAD, OF_95, WindUpTorque, check_ratio_of, on_zero_of};
 use crate::extension::{left_by_core, less, without_zero};
@@ -19,7 +16,7 @@ use crate::misfit::{about_mean, explained};
 use crate::nominal::Nominal;
 use crate::wind_up::along;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_design::tables::{generator_of, was_recorded};
+use flexspline_design::tables::was_recorded;
 
 /// A measured row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,12 +86,7 @@ pub struct ReplaySummary {
     pub torque_counts_from: &'static str,
     /// Residual of the table with the torque's sign turned, arcsec rms, where the rows show that it is.
     pub torque_turned_rms_arcsec: Option<f64>,
-    /// Other reasons that the rows allow for what the table leaves.
-    #[serde(skip)]
-    reasons: Vec<String>,
-    /// Whose rows they are, where that is known.
-    pub rows_of: Option<RowsOf>,
-    /// Remarks on them: that they are another drive's, or nobody's.
+    /// Why the table gains less than it could, or nothing.
     pub remarks: Vec<String>,
     /// Faults of the log.
     pub data_faults: Vec<Fault>,
@@ -106,82 +98,15 @@ pub struct ReplaySummary {
 
 /// Names of the [`flexspline::Quality`] of a prediction, in its order.
 const QUALITIES: [&str; 4] = ["in range", "uncertain", "extrapolated", "disabled"];
-/// File of results as `simulate` names it, and the summary in its folder.
-const RESULTS: [&str; 2] = ["results.csv", "summary.json"];
-
-/// Whose rows a file holds, as the run says that wrote them.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RowsOf {
-    /// Name of the drive.
-    pub drive: String,
-    /// Its BLAKE3, hex.
-    pub drive_hash: String,
-    /// Generator.
-    pub generator: String,
-    /// BLAKE3 of the file, hex: the summary of a replay, which may take the place of that of the run, says of which
-    /// file it is.
-    #[serde(default)]
-    pub rows_blake3: String,
-}
-
-impl RowsOf {
-    /// The owner by `summary.json` next to the results of `simulate`; nothing of any other file, or where there is
-    /// none.
-    pub fn beside(data: &Path, bytes: &[u8]) -> Option<RowsOf> {
-        let [results, summary] = RESULTS;
-        if data.file_name()?.to_str()? != results {
-            return None;
-        }
-        let text = std::fs::read_to_string(data.with_file_name(summary)).ok()?;
-        let of: Value = serde_json::from_str(&text).ok()?;
-        let rows_blake3 = blake3::hash(bytes).to_hex().to_string();
-        let replayed = of.get("rows_of");
-        let rows = serde_json::from_value::<RowsOf>(replayed.unwrap_or(&of).clone()).ok()?;
-        let of_these = replayed.is_none() || rows.rows_blake3 == rows_blake3;
-        of_these.then_some(RowsOf { rows_blake3, ..rows })
-    }
-
-    /// Why these rows are not of the drive and the generator that a table was made of, or the table names no generator
-    /// that is simulated.
-    pub fn problem(&self, table: &Table<'_>) -> Option<String> {
-        let hash = blake3::Hash::from(table.drive_hash()).to_hex().to_string();
-        let generator = generator_of(table).map_or_else(|| "an unknown generator".to_owned(), |kind| kind.to_string());
-        ((&hash, &generator) != (&self.drive_hash, &self.generator)).then(|| {
-            format!(
-                "the rows are of the drive {} (BLAKE3 {}) under {}, according to {} next to them; the table is of a \
-                 drive with ratio {} and BLAKE3 {hash} under {generator}",
-                self.drive,
-                self.drive_hash,
-                self.generator,
-                RESULTS[1],
-                table.drive().exact_ratio()
-            )
-        })
-    }
-}
 
 /// Of rows where a table was not recorded.
 const ELSEWHERE: &str = "are where the table was not recorded over the output's turn, or within 10 deg of that: its \
                          error there, and torques from the wind-up, are not known";
-/// Remark on rows whose owner is not stated.
-const OF_NOBODY: &str =
-    "no file next to the rows names their drive and generator: whether the table is theirs was not checked";
 
 impl ReplaySummary {
-    /// Puts in whose rows they are, and what has to be said of that.
-    pub fn of_rows(&mut self, rows_of: Option<RowsOf>, table: &Table<'_>) {
-        self.remarks = match &rows_of {
-            None => vec![OF_NOBODY.to_owned()],
-            Some(rows) => rows.problem(table).into_iter().collect(),
-        };
-        self.remarks.extend(self.of_gain());
-        self.rows_of = rows_of;
-    }
-
     /// Remarks where the table gains less than it could, or nothing: each explanation that the rows allow.
-    fn of_gain(&self) -> Vec<String> {
+    fn of_gain(&self, mut why: Vec<String>) -> Vec<String> {
         let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
-        let mut why = self.reasons.clone();
         why.extend(self.torque_turned_rms_arcsec.map(|turned| {
             format!(
                 "the torque has the wrong sign: with the other one the residual is {turned:.1} arcsec rms; positive is \
@@ -381,10 +306,9 @@ pub fn replay(
         rows_by_quality: by_quality,
         torque_counts_from: if has_torque(rows) { "no load" } else { "mean row" },
         torque_turned_rms_arcsec,
-        reasons,
         ..ReplaySummary::default()
     };
-    summary.of_rows(None, table);
+    summary.remarks = summary.of_gain(reasons);
     (replayed, summary)
 }
 
@@ -429,25 +353,6 @@ mod tests {
     fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasuredError> {
         let recording = parse_at_least(FEW, file, bytes, &ColumnMap::default(), &Gear::of_ratio(ratio))?;
         rows_of(recording, ratio, temperature_c).map(|read| read.rows)
-    }
-
-    /// The summary of a run speaks of its results alone, and that of a replay, which may have taken its place, of the
-    /// rows replayed.
-    #[test]
-    fn a_run_says_whose_rows_they_are() {
-        let folder = tempfile::tempdir().unwrap();
-        let data = folder.path().join("results.csv");
-        let say = |text: &str| std::fs::write(folder.path().join("summary.json"), text).unwrap();
-        assert_eq!(RowsOf::beside(&data, b"rows"), None);
-        say(r#"{ "drive": "sc0.5", "drive_hash": "c28a", "generator": "cam", "rows": 8 }"#);
-        let run = RowsOf::beside(&data, b"rows").unwrap();
-        assert_eq!((run.drive.as_str(), run.drive_hash.as_str(), run.generator.as_str()), ("sc0.5", "c28a", "cam"));
-        assert_eq!(RowsOf::beside(&folder.path().join("measured.csv"), b"rows"), None);
-        say(&serde_json::json!({ "table_id": "1", "rows_of": run }).to_string());
-        assert_eq!(RowsOf::beside(&data, b"rows").as_ref(), Some(&run));
-        assert_eq!(RowsOf::beside(&data, b"other rows"), None);
-        say(r#"{ "table_id": "1", "rows_of": null }"#);
-        assert_eq!(RowsOf::beside(&data, b"rows"), None);
     }
 
     #[test]

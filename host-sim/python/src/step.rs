@@ -7,7 +7,7 @@ use flexspline::{Approach, Direction, GeneratorAngle, OutputAngle, PlayState as 
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{dead_zone_n_m, generator_of};
 use flexspline_identify::measurement::{ColumnMap, bytes_of};
-use flexspline_identify::replay::{MeasuredRow, ReplayedRow, RowsOf, RowsRead, read, replay};
+use flexspline_identify::replay::{MeasuredRow, ReplayedRow, RowsRead, read, replay};
 use flexspline_identify::wind_up::{Hysteresis, WindUpCurve};
 use flexspline_mechanics::drive::GeneratorKind;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
@@ -371,10 +371,10 @@ impl Table {
                 session: 0,
             })
             .collect();
-        self.replayed(py, RowsRead { rows, faults: Vec::new(), notes: Vec::new() }, None)
+        self.replayed(py, RowsRead { rows, faults: Vec::new(), notes: Vec::new() })
     }
 
-    /// The same of a CSV. Rows of a run of another drive are a remark here.
+    /// The same of a CSV.
     fn replay_file<'py>(
         &self,
         py: Python<'py>,
@@ -383,7 +383,7 @@ impl Table {
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
         let (_, bytes) = bytes_of(std::path::Path::new(file)).map_err(bad)?;
         let read = read(file, &bytes[..], &ColumnMap::default(), self.table(), temperature_c, true).map_err(bad)?;
-        self.replayed(py, read, RowsOf::beside(std::path::Path::new(file), &bytes))
+        self.replayed(py, read)
     }
 
     /// Arc-seconds in a radian, as every number here is converted.
@@ -397,11 +397,9 @@ impl Table {
         &self,
         py: Python<'py>,
         RowsRead { rows, faults, notes }: RowsRead,
-        rows_of: Option<RowsOf>,
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
         let (replayed, mut summary) = py.detach(|| replay(self.table(), &rows, None));
         (summary.data_faults, summary.notes) = (faults, notes);
-        summary.of_rows(rows_of, self.table());
         let columns = PyDict::new(py);
         let numbers = |of: fn(&ReplayedRow) -> f64| replayed.iter().map(of).collect::<Vec<f64>>().into_pyarray(py);
         columns.set_item("generator_rad", numbers(|row| row.generator_rad))?;

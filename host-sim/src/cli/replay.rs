@@ -11,7 +11,7 @@ use super::{Failure, bad_input, say};
 use flexspline_base::output::Outputs;
 use flexspline_identify::calibrate::CalibrationFile;
 use flexspline_identify::measurement::bytes_of;
-use flexspline_identify::replay::{ReplaySummary, RowsOf, RowsRead, read, replay};
+use flexspline_identify::replay::{ReplaySummary, RowsRead, read, replay};
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Run the core over measured rows, open loop, and show the residual
@@ -19,9 +19,6 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// Reads a table image and a CSV with generator_rad and output_rad (or error_arcsec), optionally torque_n_m and
 /// temperature_c, or a log with other columns (--columns). Writes replay.csv, with prediction, residual and quality of
 /// each row, and summary.json.
-///
-/// Rows of `simulate` (results.csv with summary.json in the same folder) must belong to the drive and generator of the
-/// table. For other rows this cannot be checked, and a note says so.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -35,9 +32,6 @@ pub(super) struct Replay {
     /// temperature_c
     #[arg(value_name = "DATA.csv")]
     data: PathBuf,
-    /// Accept simulated rows of another drive or generator than the table's, for instance of a drive as built
-    #[arg(long)]
-    other_drive: bool,
     #[command(flatten)]
     logs: LogOptions,
     /// Temperature where the data has none, degrees C
@@ -50,33 +44,18 @@ impl Replay {
         context.refuse_drive("the drive is that of the table; allowed: --tables FILE.fxt")?;
         let image = image_file(&self.tables)?;
         let table = table_of(&self.tables, &image)?;
-        let (_, bytes) = bytes_of(&self.data).map_err(bad_input)?;
-        let rows_of = RowsOf::beside(&self.data, &bytes);
-        self.check_rows(rows_of.as_ref(), &table)?;
         // Found out before the rows are read.
         context.out()?;
         let RowsRead { rows, faults, notes } = measured(&self.data, &self.logs, &table, self.temperature_c, true)?;
         let (replayed, mut summary) = replay(&table, &rows, CalibrationFile::read(&self.tables, &table));
         (summary.data_faults, summary.notes) = (faults, notes);
         summary.command.clone_from(&context.command);
-        summary.of_rows(rows_of, &table);
         let out = context.out()?;
         let mut outputs = Outputs::new();
         outputs.csv(&out.join("replay.csv"), &replayed)?;
         outputs.json(&out.join("summary.json"), &summary)?;
         outputs.finish()?;
         context.print(&summary, || text(&summary, out) + &say::next(&self.next(context)))
-    }
-
-    /// That the rows are of the drive and the generator of the table, as far as anybody says.
-    fn check_rows(&self, rows_of: Option<&RowsOf>, table: &Table<'_>) -> Result<(), Failure> {
-        match rows_of.and_then(|rows| rows.problem(table)) {
-            Some(other) if !self.other_drive => Err(Failure::BadInput(format!(
-                "{}: {other}; allowed: the table of that drive, or --other-drive if this is meant",
-                self.data.display()
-            ))),
-            _ => Ok(()),
-        }
     }
 
     /// Where a diagnosis of the same data begins, if the image lies as `tables` writes it.
