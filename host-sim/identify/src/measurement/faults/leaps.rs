@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use super::{ARCSEC, Findings, add_steps, extent, farthest, level, whole_pitches};
+use crate::calibrate::MOST_ERROR_RAD;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
@@ -28,7 +29,8 @@ pub(super) const AROUND: usize = 3;
 /// Rows at the end of a session and at the beginning of the next whose medians are compared. *Guess*: a median of eight
 /// is not moved by two bad rows.
 const LEVEL_ROWS: usize = 8;
-/// A zero is another one if it is off by this, rad at the output: beyond any clearance and wind-up. *Guess*.
+/// A zero is another one if it is off by this beside what the load winds up, rad at the output: beyond any clearance.
+/// *Guess*.
 const OTHER_ZERO_RAD: f64 = 1500.0 * ARCSEC;
 /// A jump that is off whole tooth pitches by this share of one, or less, is left to the diagnosis: teeth may have
 /// skipped. *Guess*: wind-up that changes meanwhile is smaller.
@@ -132,8 +134,12 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
     let mut restarts: Vec<Turns> = Vec::new();
     // The rows at which sessions of another zero begin, with its change, rad.
     let mut others: Vec<(usize, f64)> = Vec::new();
-    for (start, change) in between(&sessions) {
-        let jump = change(&error);
+    let torque = log.get(Quantity::Torque);
+    let changes: Vec<(usize, f64, f64)> =
+        between(&sessions).map(|(start, change)| (start, change(&error), torque.map_or(0.0, &change))).collect();
+    let gives_way = gives_way(&changes);
+    for (start, jump, load) in changes {
+        let jump = jump - gives_way * load;
         if let Some(turns) = whole_turns(-jump * gear.ratio) {
             restarts.push((start, turns));
         } else if !grows && jump.abs() > OTHER_ZERO_RAD && whole_pitches(jump, gear, NEAR_PITCHES, 0.0).is_none() {
@@ -182,6 +188,15 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
 fn error_of(log: &Log, gear: &Gear) -> Option<Vec<f64>> {
     let rows = log.get(Quantity::Output)?.iter().zip(log.get(Quantity::Generator)?);
     Some(rows.map(|(output, psi)| output - psi / gear.ratio).collect())
+}
+
+/// What the error changes by between sessions with a newton metre of load, rad; 0 where that is beyond what a drive
+/// winds up. Changes are those of a row, of the error, and of the load.
+fn gives_way(changes: &[(usize, f64, f64)]) -> f64 {
+    let most = farthest(changes.iter().map(|(.., load)| *load)).abs();
+    let loaded = changes.iter().filter(|(.., load)| load.abs() > 0.5 * most);
+    let gives_way = median_of(&mut loaded.map(|(_, jump, load)| jump / load).collect::<Vec<f64>>());
+    if gives_way.abs() * most < MOST_ERROR_RAD { gives_way } else { 0.0 }
 }
 
 /// Whether the error grows with the angle within sessions, beyond what a drive does.
@@ -247,5 +262,9 @@ mod tests {
         assert!(faults[0].what.starts_with("the zero of 1 sessions (2) is another one"), "{}", faults[0].what);
         // Eight rows of motion are between the levels that are compared.
         assert!((others[0].1 - 0.0123).abs() < 1e-4, "{others:?}");
+        // The load is another: the drive winds up.
+        let mut loaded = log(true, 0.0, 0.0123);
+        loaded.put(Quantity::Torque, (0..1000).map(|k| if k < 500 { -20.0 } else { 20.0 }).collect());
+        assert_eq!(found(&mut loaded), (vec![], vec![]));
     }
 }
