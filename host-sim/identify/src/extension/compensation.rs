@@ -100,11 +100,12 @@ impl Evaluation {
     }
 }
 
-/// Cuts sessions into those to learn from (true) and those held out: every second one; with fewer than three sessions
-/// every third of their parts.
+/// Cuts sessions into those to learn from (true) and those held out: every second one; with fewer than three sessions,
+/// or where none of these has a load between those learnt from, every third of their parts.
 pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
-    if sessions.len() >= FEWEST_SESSIONS {
-        return (sessions.to_vec(), (0..sessions.len()).map(|k| k % 2 == 0).collect());
+    let used: Vec<bool> = (0..sessions.len()).map(|k| k % 2 == 0).collect();
+    if sessions.len() >= FEWEST_SESSIONS && within_loads(sessions, &used).contains(&true) {
+        return (sessions.to_vec(), used);
     }
     let part = |session: &Session, k: usize| {
         let rows = [k, k + 1].map(|k| session.len() * k / PARTS);
@@ -212,16 +213,12 @@ pub fn evaluate(
     evaluation
 }
 
-/// Which rows of all sessions are held out under a load between those learnt from, where any is: no table holds more.
+/// Which rows of all sessions are held out under a load between those learnt from: no table holds more.
 fn within_loads(sessions: &[Session], used: &[bool]) -> Vec<bool> {
     let loads =
         || sessions.iter().zip(used).map(|(session, used)| (session.states(0.0).map(|[_, load, _]| load), *used));
     let (low, high) = least_and_most(loads().filter(|(_, used)| *used).flat_map(|(loads, _)| loads));
-    let held = |by: fn(f64, f64, f64) -> bool| -> Vec<bool> {
-        loads().flat_map(|(loads, used)| loads.map(move |load| !used && by(low, load, high))).collect()
-    };
-    let within = held(|low, load, high| (low..=high).contains(&load));
-    if within.contains(&true) { within } else { held(|_, _, _| true) }
+    loads().flat_map(|(loads, used)| loads.map(move |load| !used && (low..=high).contains(&load))).collect()
 }
 
 /// Takes what something adds off the error of each session, arcsec.
@@ -264,6 +261,10 @@ mod tests {
         let (parts, used) = split(&[session(18), session(9)]);
         assert_eq!(used, [true, false, true].repeat(6));
         assert_eq!(parts.iter().map(Session::len).collect::<Vec<_>>(), [[2; 9], [1; 9]].concat());
+        // A load in each of which the others say nothing.
+        let loaded = |load: f64| Session { torque_n_m: Some(vec![load; 9]), ..session(9) };
+        assert_eq!(split(&[loaded(5.0), loaded(-5.0), loaded(2.0), loaded(-2.0)]).0.len(), 36);
+        assert_eq!(split(&[loaded(5.0), loaded(2.0), loaded(-5.0), loaded(-2.0)]).0.len(), 4);
         assert_eq!(parts[1].generator_rad, [2.0, 3.0]);
     }
 
