@@ -106,6 +106,10 @@ table! {
         /// A load on the output, and its column.
         #[serde(rename = "needs_torque")]
         Load = ("no load was recorded", Some("load the output, and record the torque (torque_n_m)")),
+        /// A load that turns back.
+        #[serde(rename = "needs_load_that_turns")]
+        LoadTurns = ("the load turns back in no session: no loop is seen",
+            Some("raise the load and lower it again in one session")),
         /// A spring in the nominal model.
         #[serde(rename = "needs_stiffness")]
         Spring = ("the nominal model does not wind up", Some("give the stiffness in the nominal model")),

@@ -1289,6 +1289,21 @@ fn at_one_speed_and_load_nothing_makes_a_load_swing() {
 }
 
 #[test]
+fn a_load_that_turns_back_in_no_session_opens_no_loop() {
+    let session = |load: fn(f64) -> f64| Session {
+        generator_rad: (0..3000).map(|k| 0.05 * f64::from(k)).collect(),
+        error_rad: vec![0.0; 3000],
+        torque_n_m: Some((0..3000).map(|k| load(f64::from(k) / 3000.0)).collect()),
+        ..Session::default()
+    };
+    let kept = [session(|_| 20.0), session(|_| -20.0), session(|at| 20.0 * at)];
+    let lifted = [session(|at| 20.0 * (4.0 * at).sin())];
+    for (sessions, lacks) in [(&kept[..], Some(crate::causes::Need::LoadTurns)), (&lifted[..], None)] {
+        excited_by(sessions, &catalogue_drive(), |on| assert_eq!(on.lacks(CauseName::TorsionalHysteresis), lacks));
+    }
+}
+
+#[test]
 fn two_orders_of_an_encoder_have_an_owner_each() {
     let effects = [
         "output_encoder_eccentricity:amplitude_arcsec=85,phase_rad=0.4",

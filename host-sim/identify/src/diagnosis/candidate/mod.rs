@@ -33,6 +33,7 @@ use super::rows::Rows;
 use super::thresholds::selection::AFTER_WHEELS;
 use crate::causes::{CauseName, Kin, Need, ParameterName};
 use crate::linear::Prior;
+use crate::measurement::turns;
 use crate::nominal::Nominal;
 use flexspline_base::robust::least_and_most;
 use flexspline_design::kernels::Kernels;
@@ -73,6 +74,8 @@ const LEAST_OFF_NOMINAL_K: f64 = 5.0;
 /// known. Steel teeth under oil wear by micrometres in hours: this is where even a dry or a plastic one has hardly
 /// begun.
 const USED_TURNS: f64 = 20.0;
+/// A load has turned back by this share of the largest. *Guess*: contacts that slip earlier open no loop worth a name.
+const TURNS_BACK: f64 = 0.1;
 const USED_S: f64 = 60.0;
 
 /// A load that nobody recorded on an unloaded drive may be this many times its friction, or wind it up by so much,
@@ -114,6 +117,10 @@ impl<'a> Excitation<'a> {
             Need::Teeth => self.nominal.teeth.is_some(),
             Need::Turns => rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI),
             Need::Load => self.scales.load > 0.0,
+            Need::LoadTurns => rows.sessions.iter().any(|session| {
+                let turns = turns(&rows.torque[session.clone()], TURNS_BACK * self.scales.load);
+                turns.windows(2).any(|pair| pair[0].0 * pair[1].0 < 0.0)
+            }),
             Need::Spring => self.nominal.wind_up_arcsec(1.0) > LEAST_WIND_UP_ARCSEC,
             Need::Temperature => rows.recorded.temperature,
             Need::TemperatureSpan => {

@@ -376,7 +376,7 @@ pub(crate) const TORSIONAL_HYSTERESIS: CauseSpec = CauseSpec {
     words: "torsional hysteresis",
     does: "the output lags the torque by what slipping contacts hold",
     kin: Kin::Friction,
-    needs: &[Need::Load],
+    needs: &[Need::Load, Need::LoadTurns],
     in_table: InTable::No("it depends on the torques before, and a table knows the present one alone"),
     made_by_loads: true,
     parameters: &[
