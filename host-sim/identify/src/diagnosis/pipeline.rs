@@ -630,6 +630,34 @@ mod tests {
         assert_eq!(done.diagnosis.finding, Finding::NothingFound, "{}", done.diagnosis.text());
     }
 
+    /// A drive that stands while its load changes: what winds it up turns round with its output.
+    #[test]
+    fn friction_turns_round_with_a_load_that_changes_at_rest() {
+        let (_, done) = by_ratio(|k, _| {
+            let (part, row) = ((k / 2400.0).floor(), k.rem_euclid(2400.0));
+            let load = |part: f64| -> f64 { [40.0, -20.0, 30.0, -40.0, 10.0, -30.0][part as usize] };
+            let (forth, change) = (1.0 - 2.0 * part.rem_euclid(2.0), load(part + 1.0) - load(part));
+            let more = change * ((row - 2000.0) / 200.0).clamp(0.0, 1.0);
+            // Friction gives way by some arc-seconds before it slips.
+            let (way, load) = (if (6.0 * more).abs() < 5.0 { forth } else { change.signum() }, load(part) + more);
+            let psi = 50.0 + forth * (0.05 * row.min(1800.0) - 45.0);
+            [psi, 6.0 * load - 20.0 * way + 20.0 * (2.0 * psi + 0.4).sin(), load]
+        });
+        assert_eq!(done.diagnosis.finding, Finding::NothingFound, "{}", done.diagnosis.text());
+    }
+
+    /// Without a load the motion alone chooses the flank, and friction that is stated is one with play.
+    #[test]
+    fn lost_motion_of_a_stated_friction_is_no_wider_clearance() {
+        let nominal = catalogue_drive();
+        let half = 0.5 * nominal.backlash_arcsec + nominal.wind_up_arcsec(nominal.friction_torque_n_m);
+        let (_, done) = by_ratio_and(Some(nominal.clone()), |k, _| {
+            let (way, psi) = there_and_back(k);
+            [psi, nominal.harmonics_arcsec(psi) - half * way * nominal.ratio.signum(), 0.0]
+        });
+        assert_eq!(done.diagnosis.finding, Finding::NothingFound, "{}", done.diagnosis.text());
+    }
+
     #[test]
     fn rows_that_are_all_set_aside_are_no_sound_drive() {
         let spur =

@@ -7,7 +7,7 @@ use std::ops::Range;
 use crate::least_squares::dot;
 pub(crate) use crate::least_squares::{add_scaled, combined};
 pub(crate) use crate::measurement::rms;
-use crate::measurement::{Session, cubic_at_zero, neighbours, quantile_of, rates, white_noise};
+use crate::measurement::{Session, cubic_at_zero, quantile_of, rates, turns, white_noise};
 use crate::nominal::Nominal;
 use flexspline::FixedMember;
 pub(super) use flexspline_base::statistics::mean;
@@ -28,6 +28,10 @@ const FOLLOWED: f64 = 0.1;
 const MATTERS: f64 = 0.3;
 /// A mean is known to this many of its standard deviations. *Guess*: the method asks for two to three.
 const KNOWN_TO: f64 = 2.0;
+/// An output that has come back by this much, arcsec, and by this many times the noise of its path, moves the other
+/// way. *Guess*: friction slips within a few arc-seconds; no noise of 10⁵ rows is five times as large as its spread.
+const TURNS_ROUND_ARCSEC: f64 = 3.0;
+const TURNS_ROUND_OF_NOISE: f64 = 8.0;
 
 /// Which columns were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +71,7 @@ pub struct Rows {
     pub orientation: Vec<f64>,
     /// Generator speed, rad/s (rad per row without time).
     pub speed: Vec<f64>,
-    /// Direction of the generator, ±1, held while it stands.
+    /// Direction of the output, ±1, held while it stands; positive where the generator that moves it turns forward.
     pub direction: Vec<f64>,
     /// Generator travel since the first row, rad, sessions joined.
     pub travel: Vec<f64>,
@@ -234,17 +238,10 @@ impl Rows {
         let n = self.len();
         let mut periods: Vec<f64> = Vec::with_capacity(n);
         self.speed = rates(&self.sessions, &self.time, &self.generator);
-        (self.direction, self.travel) = (vec![1.0; n], vec![0.0; n]);
+        self.travel = vec![0.0; n];
         let mut travel = 0.0;
         for session in self.sessions.clone() {
-            let mut direction = 0.0;
             for k in session.clone() {
-                let [a, b] = neighbours(&session, k);
-                let turned = self.generator[b] - self.generator[a];
-                if turned != 0.0 {
-                    direction = turned.signum();
-                }
-                self.direction[k] = direction;
                 if k > session.start {
                     travel += (self.generator[k] - self.generator[k - 1]).abs();
                     periods.push(self.time[k] - self.time[k - 1]);
@@ -255,12 +252,24 @@ impl Rows {
         periods.sort_by(f64::total_cmp);
         self.period = periods.get(periods.len() / 2).copied().filter(|p| *p > 0.0).unwrap_or(1.0);
         self.output = self.generator.iter().map(|psi| psi / nominal.ratio).collect();
+        self.direction = self.sessions.iter().flat_map(|session| self.ways(session, nominal)).collect();
         let turning = nominal.teeth.map(|teeth| teeth.fixed);
         let against = |moves: bool| -> Vec<f64> {
             self.generator.iter().zip(&self.output).map(|(psi, out)| psi - if moves { *out } else { 0.0 }).collect()
         };
         self.on_flexspline = against(turning == Some(FixedMember::CircularSpline));
         self.on_circular_spline = against(turning != Some(FixedMember::CircularSpline));
+    }
+
+    /// Ways in which the output moves in a session, whether the generator moves it or a load that changes; until it has
+    /// clearly moved that of the generator, and none where that stands.
+    fn ways(&self, session: &Range<usize>, nominal: &Nominal) -> Vec<f64> {
+        let moved = |k: usize| self.output[k] * ARCSEC_PER_RAD + nominal.wind_up_arcsec(self.torque[k]);
+        let path: Vec<f64> = session.clone().map(|k| nominal.ratio.signum() * moved(k)).collect();
+        let turns = turns(&path, TURNS_ROUND_ARCSEC + TURNS_ROUND_OF_NOISE * white_noise([&path[..]]));
+        let at_first = |speed: f64| if speed == 0.0 { 0.0 } else { speed.signum() };
+        let speeds = &self.speed[session.clone()];
+        turns.iter().zip(speeds).map(|((way, _), speed)| if *way == 0.0 { at_first(*speed) } else { *way }).collect()
     }
 
     /// Rows.

@@ -4,7 +4,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::diagnosis::rows::Rows;
-use crate::measurement::{directions, median_of, sampled};
+use crate::measurement::{median_of, sampled};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// An angle that something may be tied to.
@@ -54,10 +54,9 @@ pub struct SizeMismatch {
     pub needed: usize,
 }
 
-/// A residual over the rows less its median in each direction of the generator.
+/// A residual over the rows less its median in each direction of the output.
 pub(super) fn centred_by_direction(rows: &Rows, residual: &[f64]) -> Vec<f64> {
-    let ways = rows.sessions.iter().flat_map(|session| directions(&rows.generator[session.clone()]));
-    let values: Vec<(f64, bool)> = residual.iter().copied().zip(ways.map(|way| way > 0.0)).collect();
+    let values: Vec<(f64, bool)> = residual.iter().copied().zip(rows.direction.iter().map(|way| *way > 0.0)).collect();
     let [backward, forward] = [false, true].map(|way| {
         let of_way: Vec<f64> = values.iter().filter(|of| of.1 == way).map(|of| of.0).collect();
         median_of(&mut sampled(&of_way))

@@ -113,7 +113,7 @@ impl Drag {
         by_row(on, |k| {
             let share = (rows.speed[k] / usual).abs().powf(self.power);
             let thicker = thicker(on.nominal.temperature_c - rows.temperature[k], self.per_k, self.bend);
-            -rows.direction[k] * on.nominal.ratio.signum() * share * thicker
+            -rows.speed[k].signum() * on.nominal.ratio.signum() * share * thicker
         })
     }
 
