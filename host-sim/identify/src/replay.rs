@@ -12,7 +12,7 @@ use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, quantile_of, white_noise,
 };
-use crate::misfit::{about_mean, explained};
+use crate::misfit::{LEAVES, about_mean, explained};
 use crate::nominal::Nominal;
 use crate::wind_up::along;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -274,7 +274,20 @@ pub fn replay(
     let off: Vec<f64> = residuals.iter().map(|residual| (residual - mean_residual_arcsec).abs()).collect();
     let [torque_turned_rms_arcsec, found @ ..] = explained(table, rows, calibrated.has_delay());
     let rms_residual_arcsec = about_mean(&residuals);
-    let reasons = reasons(found, &calibrated, rms_residual_arcsec);
+    let [low, high] = table.torque_range_n_m().map(f64::from);
+    let holds = |(row, residual): (&MeasuredRow, &f64)| (low..=high).contains(&row.torque_n_m).then_some(*residual);
+    let held: Vec<f64> = rows.iter().zip(&residuals).filter_map(holds).collect();
+    let reasons = if about_mean(&held) < LEAVES * rms_residual_arcsec {
+        let without = |left: f64| format!("without them the residual is {left:.1} arcsec rms; ");
+        let rest = if held.is_empty() { String::new() } else { without(about_mean(&held)) };
+        let (beyond, all) = (rows.len() - held.len(), rows.len());
+        vec![format!(
+            "{beyond} of {all} rows are at loads that the table does not hold, {low:.2} to {high:.2} N·m; {rest}calibrate \
+             on both together"
+        )]
+    } else {
+        reasons(found, &calibrated, rms_residual_arcsec)
+    };
     let torques = torques_read(table, rows, &off, calibrated.torque_from_wind_up);
     let replayed =
         rows.iter().zip(&said).zip(residuals.iter().zip(torques)).map(|((row, said), (residual, torque))| {

@@ -174,8 +174,9 @@ impl Recorded {
     pub(crate) fn lacks(&self, part: PartName, prior: &Prior<'_>) -> Option<String> {
         let [low, high] = self.scales.torque_n_m;
         let [cold, warm] = self.scales.temperature_c;
-        // In half a turn of the output two waves in a turn gain a wave on two in a turn against the output.
-        let turns_to_tell = 0.5 * prior.nominal.ratio.abs();
+        // In an eighth of a turn of the output two waves in a turn gain a quarter of one on two in a turn against the
+        // output: enough for folds left out to choose. A guess.
+        let turns_to_tell = 0.125 * prior.nominal.ratio.abs();
         match part {
             PartName::WindUp if !self.has_torque => Some("no torque was recorded".to_owned()),
             PartName::WindUp if high - low < super::SAME_TORQUE * low.abs().max(high.abs()) || high <= low => {

@@ -607,6 +607,31 @@ fn the_phase_of_a_table_is_found_from_a_log() {
     assert!(!told.told, "{told:?}");
 }
 
+/// Through a fifth of the output's turn waves on the wheel that turns gain on those of the generator.
+#[test]
+fn a_part_of_the_turn_tells_the_wheel_that_turns_from_the_generator() {
+    let law = |psi: f64, out: f64, _: f64, _: f64| 12.0 * (2.0 * psi).sin() + 25.0 * (2.0 * (psi - out) + 0.4).sin();
+    let made = calibrate(&[up_to(recording(1, law), 1.26)], &by_ratio()).unwrap().calibration;
+    assert!(kept(&made).contains(&"material_angle") && made.held_out.rms_after_arcsec < 3.5, "{:?}", made.parts);
+}
+
+/// Rows at loads that a table was not made of are told as that.
+#[test]
+fn rows_beyond_the_loads_of_a_table_are_told() {
+    let law = |psi: f64, _: f64, torque: f64, _: f64| 12.0 * (2.0 * psi).sin() + 3.0 * torque + 0.002 * torque.powi(3);
+    let [mut light, loaded] = [1, 2].map(|seed| recording(seed, law));
+    let heavy: Vec<bool> = light.sessions[0].torque_n_m.iter().flatten().map(|torque| torque.abs() > 10.0).collect();
+    light.sessions[0].leave_out(&heavy);
+    let made = calibrate(&[light], &by_ratio()).unwrap();
+    let rows: Vec<_> = measured_rows(&loaded.sessions, 20.0).collect();
+    let summary = replay(&Table::check(&made.table.image).unwrap(), &rows, None).1;
+    let beyond = rows.iter().filter(|row| row.torque_n_m.abs() > 10.0).count() as f64;
+    let [said] = summary.remarks.as_slice() else { panic!("{:?}", summary.remarks) };
+    assert!(said.contains("of 4000 rows are at loads that the table does not hold, -"), "{said}");
+    let told: f64 = said.split("; ").nth(1).and_then(|said| said.split(' ').next()).unwrap().parse().unwrap();
+    assert!((told / beyond - 1.0).abs() < 0.02, "{told} of {beyond}");
+}
+
 /// Torques by a table of a quarter of the output's turn: there most intervals hold them, in the rest none has an end
 /// and no row counts as in range.
 #[test]
