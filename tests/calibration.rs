@@ -123,7 +123,7 @@ fn the_command_writes_a_table_that_replay_reads() {
     }
     // An eighth of a turn of the output distinguishes the wheels, whatever the ratio.
     let plan = desk.line("calibrate --plan --ratio 160 --travel-deg 0,40 --out plan").done();
-    assert!(plan.stdout.contains("20 tell it from the generator angle"), "{}", plan.stdout);
+    assert!(plan.stdout.contains("20.0 tell it from the generator angle"), "{}", plan.stdout);
 }
 
 /// A log of a drive whose error does not repeat in each turn: 300 arcsec once a turn of the output (`eccentric`), 20

@@ -195,7 +195,7 @@ impl Recorded {
                 Some(format!("{:.0} % of a generator turn was recorded", 100.0 * self.generator_share))
             }
             PartName::MaterialAngle if self.generator_turns < turns_to_tell => Some(format!(
-                "{:.1} generator turns; {turns_to_tell} tell it from the generator angle",
+                "{:.1} generator turns; {turns_to_tell:.1} tell it from the generator angle",
                 self.generator_turns
             )),
             PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
