@@ -37,8 +37,11 @@ const CERTAIN: f64 = 25.0;
 /// The drive moves evenly where the scatter of the generator's angle is below this share of what it turns by in a fast
 /// row. *Guess*: between rows from stop to stop it is 0.7 and more.
 const EVEN: f64 = 0.5;
-/// Classes are no better known than this share of their variance: steps and teeth are in it, too. *Guess*.
-const CLASS_DOUBT: f64 = 0.05;
+/// Share of the scatters by which the variance of a class is measured once more. *Guess*: beyond what a tooth hits.
+const MOST: f64 = 0.9;
+/// That share of what scatters normally is within so many standard deviations. *Source*: derived, (1 + 0.9) / 2 of the
+/// normal distribution lie below it.
+const OF_MOST: f64 = 1.645;
 /// The line fits within this χ² a class: waves of the drive miss it. *Source*: χ² has the mean of its degrees of
 /// freedom.
 const MISFIT: f64 = 1.0;
@@ -51,10 +54,11 @@ const NEAR: f64 = 0.99;
 /// 1 over that of the middle one.
 const SCATTER_GAIN: f64 = 70.0 / 36.0;
 
-/// Speed (rad of the output in a row) of many rows, and the variance of their error, rad².
+/// Speed (rad of the output in a row) of many rows, and the variance of their error, rad², by half of them and by most.
 struct Class {
     speed: f64,
     variance: f64,
+    of_most: f64,
     rows: f64,
 }
 
@@ -138,10 +142,11 @@ impl Jitter {
         let classes = classes(reads, fast);
         let floor = classes.iter().map(|class| class.variance).fold(f64::INFINITY, f64::min).max(1e-30);
         // Neighbouring scatters share rows: a class is worth about a third of its rows. A median deviation is known to
-        // 1.17 / sqrt(n).
+        // 1.17 / sqrt(n). Instants scatter in all rows alike; teeth and steps in some, of which most know more than
+        // half do.
         let weight = |class: &Class| {
-            let doubt = (2.0 * 1.17f64).powi(2) * 3.0 / class.rows + CLASS_DOUBT * CLASS_DOUBT;
-            1.0 / (doubt * class.variance.max(floor).powi(2))
+            let of_rows = (2.0 * 1.17f64).powi(2) * 3.0 / class.rows * class.variance.max(floor).powi(2);
+            1.0 / (of_rows + (class.of_most - class.variance).powi(2))
         };
         let fit = |columns: usize| {
             Normal::of(columns, classes.len(), |k, row| {
@@ -167,7 +172,9 @@ fn classes(reads: &Reads<'_>, fast: f64) -> Vec<Class> {
     let of = |class: &[(f64, f64)]| {
         let (mut off, rows): (Vec<f64>, f64) = (class.iter().map(|(_, off)| *off).collect(), class.len() as f64);
         let square = class.iter().map(|(speed, _)| speed * speed).sum::<f64>() / rows;
-        Class { speed: square.sqrt(), variance: (MAD_TO_STD * median_of(&mut off)).powi(2) / SCATTER_GAIN, rows }
+        let [variance, of_most] = [MAD_TO_STD * median_of(&mut off), quantile_of(&mut off, MOST) / OF_MOST]
+            .map(|std| std * std / SCATTER_GAIN);
+        Class { speed: square.sqrt(), variance, of_most, rows }
     };
     rows.chunks(rows.len().div_ceil(CLASSES).max(CLASS_ROWS))
         .filter(|class| class.len() >= CLASS_ROWS / 2)
@@ -285,6 +292,27 @@ mod tests {
             // Row 393 is at full speed, row 785 at rest.
             let louder = f64::hypot(1.0, jitter_s * 0.12 / (2.0 * ARCSEC));
             assert!((loud[393] / loud[785] / louder - 1.0).abs() < 0.1, "{} of {louder}", loud[393] / loud[785]);
+        }
+    }
+
+    #[test]
+    fn a_damaged_tooth_is_no_jitter_and_jitter_beside_one_is() {
+        for (jitter_s, told) in [(0.0, false), (2e-4, true)] {
+            let mut random = fastrand::Rng::with_seed(8);
+            let (mut psi, mut session) = (0.0, Session { time_s: Some(Vec::new()), ..Session::default() });
+            for k in 0..20_000u32 {
+                // Legs at up to 15 rad/s, and rests, 50 rows a second; a lobe meets the tooth twice a turn.
+                let speed = [15.0, 0.0, 7.5, 3.75][k as usize / 500 % 4];
+                psi += 0.02 * speed;
+                let tooth = 40.0 * (-((psi % std::f64::consts::PI - 1.5) / 0.12).powi(2)).exp();
+                let error = 12.0 * (2.0 * psi).sin() + 0.7 * normal(&mut random) + tooth;
+                let off = jitter_s * normal(&mut random) * speed / RATIO;
+                session.push([0.02 * f64::from(k), psi, error * ARCSEC + off, f64::NAN]);
+            }
+            let mut findings = Findings::default();
+            Log::on(std::slice::from_mut(&mut session), |log| check(log, &Gear::of_ratio(RATIO), &mut findings));
+            let names: Vec<FaultName> = findings.faults.iter().map(|fault| fault.name).collect();
+            assert_eq!(names, if told { vec![FaultName::ReadJitter] } else { vec![] }, "{jitter_s}");
         }
     }
 
