@@ -19,8 +19,8 @@ const BLURRED: f64 = 0.7;
 
 /// A step is real if the output leaves this share of it as noise… *Guess*: half of the 0.29 that rounding leaves.
 const SEEN: f64 = 0.15;
-/// …or, in even motion, the channel's changes from row to row are uneven by a step in this share. *Guess*: an exact one
-/// is uneven nowhere.
+/// …or, in even motion, rows are off those beside them by a quarter of a step in this share, each at its time. *Guess*: an exact
+/// channel is so nowhere.
 const UNEVEN: f64 = 0.1;
 /// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in
 /// the error, which differs by 0.4 steps on the mean from one reading to another: where half of them differ by less
@@ -81,10 +81,14 @@ fn of_piece(values: &[f64]) -> Option<f64> {
 pub(super) fn seen(log: &Log, gear: &Gear) -> Vec<(Quantity, f64)> {
     let Some(rows) = longest(log) else { return Vec::new() };
     let (generator, error) = (&log.of(Quantity::Generator)[rows.clone()], &log.of(Quantity::Error)[rows.clone()]);
-    let output = &log.output_rad(gear.ratio)[rows];
+    let output = &log.output_rad(gear.ratio)[rows.clone()];
     let noise = white_noise(log.pieces(log.of(Quantity::Error)));
+    // Where rows are missing, an even motion does not move by the same in each.
+    let time = log.get(Quantity::Time).map(|time| &time[rows]);
+    let between = |k: usize| time.map_or(0.5, |time| (time[k] - time[k - 1]) / (time[k + 1] - time[k - 1]));
     let uneven = |values: &[f64], step: f64| {
-        let bends = values.windows(3).filter(|v| (v[2] - 2.0 * v[1] + v[0]).abs() > 0.5 * step).count();
+        let off = |(k, v): (usize, &[f64])| (v[1] - v[0] - between(k) * (v[2] - v[0])).abs();
+        let bends = (1..).zip(values.windows(3)).filter(|row| off(*row) > 0.25 * step).count();
         bends as f64 >= UNEVEN * values.len() as f64
     };
     let mut found = Vec::new();
@@ -170,6 +174,15 @@ mod tests {
         // Seven readings at each stop.
         let stops = |k: f64| 1.1 * (k / 7.0).floor();
         assert_eq!(of_generator(session(6000, stops, |psi| psi)), None);
+    }
+
+    #[test]
+    fn an_even_motion_of_which_rows_are_missing_is_no_resolution() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let mut session = session(6000, |k| 0.002 * k, |psi| psi);
+        session.time_s = Some((0..6000).map(|k| 0.02 * f64::from(k)).collect());
+        session.leave_out(&(0..6000).map(|_| random.f64() < 0.1).collect::<Vec<bool>>());
+        assert_eq!(of_generator(session), None);
     }
 
     #[test]
