@@ -559,6 +559,40 @@ fn the_play_of_a_single_turn_is_no_lost_index() {
     }
 }
 
+/// Loads that go from level to level within .6 s, in motion and at rest, on a spring with knees, play and drag.
+#[test]
+fn a_load_that_is_changed_at_once_is_no_lost_index() {
+    let spring = |load: f64| {
+        let past = |knee: f64| load.signum() * (load.abs() - knee).max(0.0);
+        10.3 * load - 2.4 * past(12.0) - 1.1 * past(20.0) + 30.0 * (load / 0.3).tanh()
+    };
+    for seed in 0..6 {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut bench = Bench { torque_n_m: Some(Vec::new()), ..Bench::default() };
+        let levels: Vec<f64> =
+            (0..60).map(|_| 30.0 * random.choice([-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0]).unwrap()).collect();
+        let (mut psi, mut before, mut way) = (0.0_f64, 0.0, 1.0_f64);
+        for k in 0..20_000 {
+            let (leg, row) = (k / 2500, (k % 2500) as f64);
+            let pace = 0.32 * (row / 40.0).min((2300.0 - row) / 40.0).clamp(0.0, 1.0);
+            psi += if leg % 2 == 0 { pace } else { -pace };
+            let (at, since) = (k / 350, (k % 350) as f64);
+            let [from, to] = [levels[at], levels[at + 1]];
+            let load = from + (to - from) * ((since - 320.0) / 30.0).max(0.0);
+            // Friction slips after two arc-seconds.
+            let moved = psi / RATIO / ARCSEC + spring(load);
+            way = (way + 0.5 * (moved - before)).clamp(-1.0, 1.0);
+            before = moved;
+            let error = spring(load - 0.6 * way) + 20.0 * (2.0 * psi).sin() + 0.5 * normal(&mut random);
+            bench.time_s.push(0.02 * k as f64 + 400.0 * (k / 5000) as f64);
+            bench.generator_rad.push(psi);
+            bench.output_rad.push(psi / RATIO + error * ARCSEC);
+            bench.torque_n_m.as_mut().unwrap().push(load + 0.05 * normal(&mut random));
+        }
+        assert_eq!(faults_by_ratio(&bench).unwrap(), [], "seed {seed}");
+    }
+}
+
 /// Back and forth at six paces: angles read two milliseconds apart lie off by another amount on each way.
 #[test]
 fn a_delay_of_the_rows_is_no_lost_index() {

@@ -39,6 +39,10 @@ const FEWEST_TURNS: f64 = 4.0;
 const BESIDE_A_TURN: Range<usize> = 2..10;
 /// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it. *Guess*.
 const SURE: f64 = 3.0;
+/// A load is changed at once where it goes by this share of the largest from one row to the next, and by this multiple
+/// of its noise. *Guess*: a hundred rows lead an arm through its load.
+const SUDDEN: f64 = 0.01;
+const OF_THE_NOISE: f64 = 6.0;
 
 /// Rows of all files.
 #[derive(Clone, Default)]
@@ -378,14 +382,19 @@ impl Rows {
         };
         // A flank that changes is none, or one that friction lets go: neither lies among the rows about a step.
         let flank = |row: &Row| flank(&row.at, model.scales.friction_n_m);
-        let held_n_m = HELD * self.loads.iter().fold(0.0, |most: f64, (_, load)| most.max(load.abs()));
+        let most_n_m = self.loads.iter().fold(0.0, |most: f64, (_, load)| most.max(load.abs()));
+        let held_n_m = HELD * most_n_m;
         let hold = |row: &Row| (session(row), row.at.way, flank(row), row.at.torque_n_m.abs() >= held_n_m);
         let (mut ends, mut ends_of_sessions) = (vec![0; logs], vec![0; session(self.rows.last()?) + 1]);
         for row in &self.rows {
             ends[row.at.log] = place(row) + 1;
             ends_of_sessions[session(row)] = place(row) + 1;
         }
-        let places = self.rows.chunk_by(|a, b| hold(a) == hold(b)).filter(|rows| hold(&rows[0]).3).flat_map(|rows| {
+        // Nor does a load that is changed at once: what the model has of the spring is not exact.
+        let load: Vec<f64> = self.rows.iter().map(|row| row.at.torque_n_m).collect();
+        let steady_n_m = (SUDDEN * most_n_m).max(OF_THE_NOISE * white_noise([load.as_slice()]));
+        let goes_on = |a: &Row, b: &Row| hold(a) == hold(b) && (a.at.torque_n_m - b.at.torque_n_m).abs() <= steady_n_m;
+        let places = self.rows.chunk_by(goes_on).filter(|rows| hold(&rows[0]).3).flat_map(|rows| {
             let of = place(&rows[0])..place(&rows[rows.len() - 1]) + 1;
             let mut to = vec![ends[rows[0].at.log], ends_of_sessions[session(&rows[0])]];
             to.dedup();
