@@ -282,8 +282,8 @@ pub fn replay(
         let rest = if held.is_empty() { String::new() } else { without(about_mean(&held)) };
         let (beyond, all) = (rows.len() - held.len(), rows.len());
         vec![format!(
-            "{beyond} of {all} rows are at loads that the table does not hold, {low:.2} to {high:.2} N·m; {rest}calibrate \
-             on both together"
+            "{beyond} of {all} rows are at loads that the table does not hold, {low:.2} to {high:.2} N·m; \
+             {rest}calibrate on both together"
         )]
     } else {
         reasons(found, &calibrated, rms_residual_arcsec)

@@ -39,9 +39,10 @@ const FEWEST_TURNS: f64 = 4.0;
 const BESIDE_A_TURN: Range<usize> = 2..10;
 /// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it. *Guess*.
 const SURE: f64 = 3.0;
-/// A load is changed at once where it goes by this share of the largest from one row to the next, and by this multiple
-/// of its noise. *Guess*: a hundred rows lead an arm through its load.
+/// A load is changed at once where it goes by this share of the largest from one row to the next… *Guess*: a hundred
+/// rows lead an arm through its load.
 const SUDDEN: f64 = 0.01;
+/// …and by this multiple of its noise. *Guess*: no noise of 10⁵ rows goes so far.
 const OF_THE_NOISE: f64 = 6.0;
 
 /// Rows of all files.

@@ -28,9 +28,9 @@ const FOLLOWED: f64 = 0.1;
 const MATTERS: f64 = 0.3;
 /// A mean is known to this many of its standard deviations. *Guess*: the method asks for two to three.
 const KNOWN_TO: f64 = 2.0;
-/// An output that has come back by this much, arcsec, and by this many times the noise of its path, moves the other
-/// way. *Guess*: friction slips within a few arc-seconds; no noise of 10⁵ rows is five times as large as its spread.
+/// An output that has come back by this much, arcsec, … *Guess*: friction slips within a few arc-seconds.
 const TURNS_ROUND_ARCSEC: f64 = 3.0;
+/// … and by this many times the noise of its path, moves the other way. *Guess*: of 10⁵ rows none is as far off.
 const TURNS_ROUND_OF_NOISE: f64 = 8.0;
 
 /// Which columns were recorded.

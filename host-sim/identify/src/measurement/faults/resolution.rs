@@ -19,8 +19,8 @@ const BLURRED: f64 = 0.7;
 
 /// A step is real if the output leaves this share of it as noise… *Guess*: half of the 0.29 that rounding leaves.
 const SEEN: f64 = 0.15;
-/// …or, in even motion, rows are off those beside them by a quarter of a step in this share, each at its time. *Guess*: an exact
-/// channel is so nowhere.
+/// …or, in even motion, rows are off those beside them by a quarter of a step in this share, each at its time. *Guess*:
+/// an exact channel is so nowhere.
 const UNEVEN: f64 = 0.1;
 /// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in
 /// the error, which differs by 0.4 steps on the mean from one reading to another: where half of them differ by less
