@@ -42,8 +42,8 @@ const SURE: f64 = 3.0;
 /// A load is changed at once where it goes by this share of the largest from one row to the next… *Guess*: a hundred
 /// rows lead an arm through its load.
 const SUDDEN: f64 = 0.01;
-/// …and by this multiple of its noise. *Guess*: no noise of 10⁵ rows goes so far.
-const OF_THE_NOISE: f64 = 6.0;
+/// …and by this multiple of what it usually does, noise or swing. *Guess*: of 10⁵ rows no noise goes so far.
+const FAR_FASTER: f64 = 6.0;
 
 /// Rows of all files.
 #[derive(Clone, Default)]
@@ -392,9 +392,10 @@ impl Rows {
             ends_of_sessions[session(row)] = place(row) + 1;
         }
         // Nor does a load that is changed at once: what the model has of the spring is not exact.
-        let load: Vec<f64> = self.rows.iter().map(|row| row.at.torque_n_m).collect();
-        let steady_n_m = (SUDDEN * most_n_m).max(OF_THE_NOISE * white_noise([load.as_slice()]));
-        let goes_on = |a: &Row, b: &Row| hold(a) == hold(b) && (a.at.torque_n_m - b.at.torque_n_m).abs() <= steady_n_m;
+        let change = |a: &Row, b: &Row| (a.at.torque_n_m - b.at.torque_n_m).abs();
+        let mut changes: Vec<f64> = self.rows.windows(2).map(|pair| change(&pair[0], &pair[1])).collect();
+        let steady_n_m = (SUDDEN * most_n_m).max(FAR_FASTER * quantile_of(&mut changes, 0.5));
+        let goes_on = |a: &Row, b: &Row| hold(a) == hold(b) && change(a, b) <= steady_n_m;
         let places = self.rows.chunk_by(goes_on).filter(|rows| hold(&rows[0]).3).flat_map(|rows| {
             let of = place(&rows[0])..place(&rows[rows.len() - 1]) + 1;
             let mut to = vec![ends[rows[0].at.log], ends_of_sessions[session(&rows[0])]];

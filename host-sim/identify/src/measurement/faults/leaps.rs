@@ -190,13 +190,14 @@ fn error_of(log: &Log, gear: &Gear) -> Option<Vec<f64>> {
     Some(rows.map(|(output, psi)| output - psi / gear.ratio).collect())
 }
 
-/// What the error changes by between sessions with a newton metre of load, rad; 0 where that is beyond what a drive
-/// winds up. Changes are those of a row, of the error, and of the load.
+/// What the error changes by between sessions with a newton metre of load, rad, where that alone is what it changes by
+/// from session to session, as a drive winds up; else 0. Changes are those of a row, of the error, and of the load.
 fn gives_way(changes: &[(usize, f64, f64)]) -> f64 {
     let most = farthest(changes.iter().map(|(.., load)| *load)).abs();
-    let loaded = changes.iter().filter(|(.., load)| load.abs() > 0.5 * most);
-    let gives_way = median_of(&mut loaded.map(|(_, jump, load)| jump / load).collect::<Vec<f64>>());
-    if gives_way.abs() * most < MOST_ERROR_RAD { gives_way } else { 0.0 }
+    let loaded = || changes.iter().filter(|(.., load)| load.abs() > 0.5 * most);
+    let gives_way = median_of(&mut loaded().map(|(_, jump, load)| jump / load).collect::<Vec<f64>>());
+    let alone = changes.iter().all(|(_, jump, load)| (jump - gives_way * load).abs() < OTHER_ZERO_RAD);
+    if loaded().count() > 1 && alone && gives_way.abs() * most < MOST_ERROR_RAD { gives_way } else { 0.0 }
 }
 
 /// Whether the error grows with the angle within sessions, beyond what a drive does.
@@ -262,9 +263,15 @@ mod tests {
         assert!(faults[0].what.starts_with("the zero of 1 sessions (2) is another one"), "{}", faults[0].what);
         // Eight rows of motion are between the levels that are compared.
         assert!((others[0].1 - 0.0123).abs() < 1e-4, "{others:?}");
-        // The load is another: the drive winds up.
-        let mut loaded = log(true, 0.0, 0.0123);
-        loaded.put(Quantity::Torque, (0..1000).map(|k| if k < 500 { -20.0 } else { 20.0 }).collect());
+        // Of three sessions each has another load than the one before: the drive winds up.
+        let mut loaded = log(true, 0.0, 0.0);
+        let load = |k: u32| if k / 350 == 1 { 20.0 } else { -20.0 };
+        loaded.session = (0..1000).map(|k| k / 350).collect();
+        loaded.put(Quantity::Torque, (0..1000).map(load).collect());
+        loaded.put(Quantity::Output, (0..1000).map(|k| 0.001 * f64::from(k) + 3e-4 * load(k)).collect());
         assert_eq!(found(&mut loaded), (vec![], vec![]));
+        // Without them that is another zero of each.
+        loaded.take(Quantity::Torque);
+        assert_eq!(found(&mut loaded).1.len(), 2);
     }
 }
