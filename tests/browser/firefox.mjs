@@ -74,7 +74,10 @@ await check("a log dropped on it leads to a verdict and a table", async () => {
   const begun = Date.now();
   await input.uploadFile(path.join(project, "examples/csf17_100/error_vs_input.csv"));
   await page.waitForSelector("#first-rows");
-  for (const [field, value] of [["#ratio", "100"], ["#backlash", "30"]]) {
+  for (const [field, value] of [
+    ["#ratio", "100"],
+    ["#backlash", "30"],
+  ]) {
     await page.type(field, value);
     await page.keyboard.press("Enter");
   }
