@@ -252,6 +252,24 @@ fn reasons([other_load, delay]: [Option<f64>; 2], calibrated: &CalibrationFile, 
     delay.into_iter().chain(other_load.or(one_load)).collect()
 }
 
+/// Where loads that the table does not hold leave much of rows: how many these are, and what is left without them.
+fn beyond_loads(table: &Table<'_>, rows: &[MeasuredRow], residuals: &[f64]) -> Option<String> {
+    let [low, high] = table.torque_range_n_m().map(f64::from);
+    let holds = |(row, residual): (&MeasuredRow, &f64)| (low..=high).contains(&row.torque_n_m).then_some(*residual);
+    let held: Vec<f64> = rows.iter().zip(residuals).filter_map(holds).collect();
+    let left = about_mean(&held);
+    let rest =
+        if held.is_empty() { String::new() } else { format!("without them the residual is {left:.1} arcsec rms; ") };
+    (left < LEAVES * about_mean(residuals)).then(|| {
+        format!(
+            "{} of {} rows are at loads that the table does not hold, {low:.2} to {high:.2} N·m; {rest}calibrate on \
+             both together",
+            rows.len() - held.len(),
+            rows.len()
+        )
+    })
+}
+
 /// Runs the core over the rows, from a state it does not know. `calibrated` is what the calibration of the table says,
 /// if there was one.
 pub fn replay(
@@ -274,20 +292,8 @@ pub fn replay(
     let off: Vec<f64> = residuals.iter().map(|residual| (residual - mean_residual_arcsec).abs()).collect();
     let [torque_turned_rms_arcsec, found @ ..] = explained(table, rows, calibrated.has_delay());
     let rms_residual_arcsec = about_mean(&residuals);
-    let [low, high] = table.torque_range_n_m().map(f64::from);
-    let holds = |(row, residual): (&MeasuredRow, &f64)| (low..=high).contains(&row.torque_n_m).then_some(*residual);
-    let held: Vec<f64> = rows.iter().zip(&residuals).filter_map(holds).collect();
-    let reasons = if about_mean(&held) < LEAVES * rms_residual_arcsec {
-        let without = |left: f64| format!("without them the residual is {left:.1} arcsec rms; ");
-        let rest = if held.is_empty() { String::new() } else { without(about_mean(&held)) };
-        let (beyond, all) = (rows.len() - held.len(), rows.len());
-        vec![format!(
-            "{beyond} of {all} rows are at loads that the table does not hold, {low:.2} to {high:.2} N·m; \
-             {rest}calibrate on both together"
-        )]
-    } else {
-        reasons(found, &calibrated, rms_residual_arcsec)
-    };
+    let reasons = beyond_loads(table, rows, &residuals)
+        .map_or_else(|| reasons(found, &calibrated, rms_residual_arcsec), |beyond| vec![beyond]);
     let torques = torques_read(table, rows, &off, calibrated.torque_from_wind_up);
     let replayed =
         rows.iter().zip(&said).zip(residuals.iter().zip(torques)).map(|((row, said), (residual, torque))| {

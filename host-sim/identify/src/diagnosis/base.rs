@@ -96,7 +96,7 @@ pub(crate) struct Floating {
     pub name: String,
     /// Column, arcsec per unit of the coefficient.
     pub values: Vec<f64>,
-    /// Standard deviation between units; large for the zero of the encoder.
+    /// Standard deviation between units; large for the zero of the encoder, [`HELD`] of what does not float.
     pub spread: f64,
 }
 
@@ -173,14 +173,13 @@ const CLEARLY_BETTER: f64 = 0.995;
 const FAR_BETTER: f64 = 0.8;
 /// Share of its squares below which hardly anything of a column is its own. *Guess*: what is left where a drive turns.
 const HARDLY_OWN: f64 = 0.1;
-/// A drag that rows do not show floats by this share of the one stated. *Guess*: next to nothing; other rows that a fit
-/// predicts have its columns all the same.
-const NOT_FELT: f64 = 1e-6;
+/// Spread of what stays as stated in these rows, and may not in others that a fit predicts.
+pub(super) const HELD: f64 = f64::MIN_POSITIVE;
 /// Rows are uncertain where the torque is below this multiple of friction. *Guess*: friction of a unit is known to a
 /// quarter.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
-/// Nor is a flank sure below this share of the load. *Source*: the catalogue's lost motion is that between loads of 4 %
-/// of the rated one, either way: below it teeth come into contact.
+/// Nor is a flank sure below this share of the largest load, for the rated one. *Source*: a catalogue's lost motion is
+/// that between loads of 4 % of the rated one, either way (Hrcek et al., Materials 14 (2021) 5057).
 const SETTLES: f64 = 0.04;
 /// A clearance is crossed within this time, s. *Guess*: twice the longest of [`FLANK_S`].
 const CROSSING_S: f64 = 0.08;
@@ -263,7 +262,7 @@ impl Base {
             (stated_n_m, by_motion || fewer > (1.0 - CLEARLY_BETTER) * dot(&left, &left))
         };
         for column in [against, under_load] {
-            add("drag", column, drag_n_m * if winds_up { 1.0 } else { NOT_FELT });
+            add("drag", column, if winds_up { drag_n_m } else { HELD });
         }
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         // Of a spring that nobody has stated nothing says how it hardens, nor, where a load goes with the angle of the

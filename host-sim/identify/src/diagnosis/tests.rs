@@ -179,6 +179,7 @@ fn an_output_that_takes_milliseconds_to_its_other_flank_is_a_perfect_drive() {
         let sessions = slow_to_its_other_flank(&nominal, lag_s);
         let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap().0;
         assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{lag_s}: {}", diagnosis.text());
+        assert!(!diagnosis.recalibrated.contains_key("drag"), "that the rows do not show");
         let said = diagnosis.recalibrated.iter().filter(|(name, _)| name.starts_with(super::base::CHANGE_OF_FLANK));
         let said: f64 = said.map(|(_, of)| of.value).sum();
         assert!((said - lag_s).abs() < 1e-3, "{said} for {lag_s}");

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use super::base::HELD;
 use super::candidate::{Label, Law, Per, standing_pitch_error};
 use super::model::{Problem, Term, but};
 use super::noise::Noise;
@@ -545,7 +546,7 @@ fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<Stri
     let n = selected.fit.priors.len();
     let mut named = BTreeMap::new();
     let covariance = selected.fit.solution.covariance();
-    for (k, floating) in problem.on.base.floating.iter().enumerate() {
+    for (k, floating) in problem.on.base.floating.iter().enumerate().filter(|(_, floating)| floating.spread > HELD) {
         let name =
             if named.contains_key(&floating.name) { format!("{} {k}", floating.name) } else { floating.name.clone() };
         named.insert(

@@ -525,7 +525,7 @@ fn alike(cause: &Cause) -> Vec<String> {
     cause.look_alikes.iter().map(|name| name.words().to_owned()).chain(cause.outside_the_library()).collect()
 }
 
-/// A free parameter of the nominal model: the zero as an error, times in milliseconds, the rest as a share.
+/// A free parameter of the nominal model: the zero as an error, times in milliseconds, drag in N·m, the rest as a share.
 fn recalibrated_value(name: &str, p: Parameter) -> RichText {
     if name.starts_with("zero") {
         return RichText::arcsec(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
@@ -533,6 +533,8 @@ fn recalibrated_value(name: &str, p: Parameter) -> RichText {
     let words = if [BETWEEN_READINGS, CHANGE_OF_FLANK].contains(&name) {
         let ms = |seconds: f64| significant(1e3 * seconds, 2);
         format!("{}\u{a0}±\u{a0}{}\u{a0}ms", ms(p.value), ms(p.std))
+    } else if name.starts_with("drag") {
+        format!("{}\u{a0}±\u{a0}{}\u{a0}N·m", significant(p.value, 2), significant(p.std, 2))
     } else {
         format!("{:+.1}\u{a0}±\u{a0}{:.1}\u{a0}%", 100.0 * p.value, 100.0 * p.std)
     };
@@ -551,10 +553,11 @@ mod tests {
     use flexspline_identify::synthesize::catalogue_drive;
 
     #[test]
-    fn times_that_float_are_shown_in_milliseconds_and_the_rest_as_shares() {
+    fn times_that_float_are_shown_in_milliseconds_drag_in_newton_metres_and_the_rest_as_shares() {
         let shown = |name: &str| recalibrated_value(name, Parameter { value: -4.2e-3, std: 1.1e-3 });
         assert_eq!(shown(CHANGE_OF_FLANK), RichText::new("−4.2\u{a0}±\u{a0}1.1\u{a0}ms"));
         assert_eq!(shown(BETWEEN_READINGS), shown(CHANGE_OF_FLANK));
+        assert_eq!(shown("drag 6"), RichText::new("−0.0042\u{a0}±\u{a0}0.0011\u{a0}N·m"));
         assert_eq!(shown("backlash"), RichText::new("−0.4\u{a0}±\u{a0}0.1\u{a0}%"));
     }
 

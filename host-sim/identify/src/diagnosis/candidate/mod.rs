@@ -74,9 +74,10 @@ const LEAST_OFF_NOMINAL_K: f64 = 5.0;
 /// known. Steel teeth under oil wear by micrometres in hours: this is where even a dry or a plastic one has hardly
 /// begun.
 const USED_TURNS: f64 = 20.0;
+const USED_S: f64 = 60.0;
+
 /// A load has turned back by this share of the largest. *Guess*: contacts that slip earlier open no loop worth a name.
 const TURNS_BACK: f64 = 0.1;
-const USED_S: f64 = 60.0;
 
 /// A load that nobody recorded on an unloaded drive may be this many times its friction, or wind it up by so much,
 /// arcsec.
