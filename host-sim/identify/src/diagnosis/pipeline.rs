@@ -259,6 +259,10 @@ impl<'a> Subject<'a> {
     fn prior<'t>(&'t self, known: Option<&'t Table<'t>>) -> Prior<'t> {
         match known.or(self.table.as_ref()) {
             Some(table) => Prior::of_table(table, self.kind),
+            // A model that was made of these rows was not known before them.
+            None if self.note.is_some() => {
+                Prior { hash: self.hash(), ..Prior::of_ratio(self.nominal.ratio, self.kind) }
+            }
             None => Prior { hash: self.hash(), ..Prior::of_nominal(self.nominal.clone(), CATALOGUE_DRIVE, self.kind) },
         }
     }
