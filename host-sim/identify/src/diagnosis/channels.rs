@@ -190,26 +190,21 @@ impl TorqueEffect {
     }
 }
 
-/// Factors by which a torque may be wrong: turned round, the other shaft, by this ratio, or another unit; all of them
-/// turned round.
-fn factors(ratio: f64) -> impl Iterator<Item = f64> {
-    let shafts = [ratio.abs(), 1.0 / ratio.abs()];
-    let sizes = shafts.into_iter().chain(UNITS.map(|(_, factor)| factor));
-    sizes.flat_map(|factor| [factor, -factor]).chain([-1.0])
+/// How a torque of which N·m were said may be meant, as a mapping says it, with its factor: in another unit, of the
+/// generator's shaft or divided by the ratio twice, and all of them turned round.
+fn readings(ratio: f64) -> impl Iterator<Item = (String, f64)> {
+    let ratio = ratio.abs();
+    let shafts = [(format!("N.m*{ratio}"), ratio), (format!("N.m/{ratio}"), 1.0 / ratio)];
+    let meant = shafts.into_iter().chain(UNITS.map(|(unit, factor)| (unit.to_owned(), factor)));
+    meant.flat_map(|(unit, factor)| [(format!("-{unit}"), -factor), (unit, factor)])
 }
 
 /// Units that a torque may be in though N·m was said, as a mapping names them, in N·m.
-const UNITS: [(&str, f64); 5] =
-    [("N.cm", 1e-2), ("mN.m", 1e-3), ("kN.m", 1e3), ("lbf.in", 0.112_985), ("N.m*9.80665", 9.806_65)];
+const UNITS: [(&str, f64); 6] =
+    [("N.m", 1.0), ("N.cm", 1e-2), ("mN.m", 1e-3), ("kN.m", 1e3), ("lbf.in", 0.112_985), ("N.m*9.80665", 9.806_65)];
 
-/// The unit of a factor, and which way it counts.
-fn unit_of(factor: f64) -> Option<String> {
-    let sign = if factor < 0.0 { "-" } else { "" };
-    UNITS.iter().find(|(_, of)| *of == factor.abs()).map(|(name, _)| format!("{sign}{name}"))
-}
-
-/// Holds the torque against what it should do; turned round, or taken to the other shaft, where that explains it; left
-/// out where it does nothing, or where it looks like another unit. Gives why the data are unusable, where they are.
+/// Holds the torque against what it should do; turned round where that explains it; left out where it does nothing, or
+/// where it looks like another unit or shaft. Gives why the data are unusable, where they are.
 pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
     let rows = Rows::new(&recording.sessions, nominal);
     if nominal.wind_up_arcsec(1.0) == 0.0 {
@@ -232,46 +227,45 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     if seen(&recorded) && recorded.share > NO_EFFECT && !too_soft {
         return None;
     }
-    let explains = |(factor, effect): &(f64, TorqueEffect), recorded: &TorqueEffect, none: f64| {
+    let explains = |(_, factor, effect): &(String, f64, TorqueEffect), recorded: &TorqueEffect, none: f64| {
         let of_this_drive = |share: f64| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&share);
         let most = if *factor == -1.0 { EXPLAINS_TURNED } else { EXPLAINS };
         let fits = of_this_drive(effect.share) && (!too_soft || of_this_drive(effect.wind_up));
         seen(effect) && fits && effect.share > CERTAIN * effect.std && effect.left < most * recorded.left.min(none)
     };
-    let tried = factors(nominal.ratio).map(|factor| (factor, TorqueEffect::by(&sampled, factor)));
-    let mut best = tried.filter(|tried| explains(tried, &recorded, none)).min_by(|a, b| a.1.left.total_cmp(&b.1.left));
+    let tried = readings(nominal.ratio).map(|(unit, factor)| (unit, factor, TorqueEffect::by(&sampled, factor)));
+    let mut meant: Vec<_> = tried.filter(|tried| explains(tried, &recorded, none)).collect();
+    meant.sort_by(|a, b| a.2.left.total_cmp(&b.2.left));
     // Where each session keeps to one load, a zero of its own hides what that does; of three and more a line shows.
-    if !seen(&recorded) && best.is_none() && rows.zeros.is_empty() && rows.sessions_used().count() > 2 {
+    if !seen(&recorded) && meant.is_empty() && rows.zeros.is_empty() && rows.sessions_used().count() > 2 {
         let by_session = Sampled::new(&rows, (nominal, table), 0);
         (recorded, none) = at_first(&by_session);
-        best = Some((-1.0, TorqueEffect::by(&by_session, -1.0))).filter(|turned| explains(turned, &recorded, none));
-        best.as_ref()?;
+        meant.push((String::new(), -1.0, TorqueEffect::by(&by_session, -1.0)));
+        if !explains(&meant[0], &recorded, none) {
+            return None;
+        }
     }
     let nothing = seen(&recorded) && 1.0 - recorded.share > CERTAIN * recorded.std && recorded.left > none;
-    let (factor, name, what) = match best.map(|(factor, effect)| (unit_of(factor), factor, effect)) {
-        // A stiffness that looks like another unit is a look, no word: a soft drive does the same.
-        Some((Some(unit), _, effect)) => {
+    let (repaired, name, what) = match meant.first() {
+        Some((_, -1.0, effect)) => {
             let what = format!(
-                "the residual is {:.0} arcsec with the torque as given, {:.0} if it is in {unit}: nothing says so, and \
-                 it is not converted; if it is, say --columns torque=NAME:{unit}, else the drive is not as stiff as \
-                 its model says; load and drive are indistinguishable",
-                recorded.left, effect.left
+                "the torque turned round gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of the \
+                 nominal ones); as it stands it leaves {:.0} arcsec, so {:.0}: it was turned round",
+                effect.share, effect.std, recorded.left, effect.left
+            );
+            (Some(|torque: f64| -torque), FaultName::TorqueSign, what)
+        }
+        // A stiffness that looks like another unit, or the other shaft, is a look, no word: a soft drive does the same.
+        Some((first, ..)) => {
+            let if_so = meant.iter().map(|(unit, _, effect)| format!("{:.0} if it is in {unit}", effect.left));
+            let what = format!(
+                "the residual is {:.0} arcsec with the torque as given, {}: nothing says so, and it is not converted; \
+                 if it is, say so, as in --columns torque=NAME:{first}, else the drive is not as stiff as its model \
+                 says; load and drive are indistinguishable",
+                recorded.left,
+                if_so.collect::<Vec<String>>().join(", ")
             );
             (None, FaultName::UnitMismatch, what)
-        }
-        Some((None, factor, effect)) => {
-            let turned = factor == -1.0;
-            let name = if turned { FaultName::TorqueSign } else { FaultName::TorqueScale };
-            let what = format!(
-                "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of \
-                 the nominal ones); as it stands it leaves {:.0} arcsec, so {:.0}: it was {}",
-                effect.share,
-                effect.std,
-                recorded.left,
-                effect.left,
-                if turned { "turned round" } else { "converted" }
-            );
-            (Some(factor), name, what)
         }
         None if nothing => {
             let what = format!(
@@ -283,9 +277,9 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
         }
         None => return None,
     };
-    let size = if factor.is_some() { none } else { recorded.size };
-    report(recording, name, size, what.clone(), factor.map(|factor| move |torque: f64| factor * torque));
-    factor.is_none().then_some(what)
+    let size = if repaired.is_some() { none } else { recorded.size };
+    report(recording, name, size, what.clone(), repaired);
+    repaired.is_none().then_some(what)
 }
 
 /// Reports a fault of the torque in all rows, which are changed as it is `repaired`; without that it is left out.
@@ -684,7 +678,7 @@ mod tests {
     }
 
     #[test]
-    fn a_torque_is_turned_round_converted_or_left_out_and_a_right_one_left_alone() {
+    fn a_torque_is_turned_round_or_left_out_and_a_right_one_left_alone() {
         let load = 25.0 * (0.9f64 * 1.5).sin() + 6.0 * (2.3f64 * 1.5).cos();
         let near = |torque: Option<f64>| (torque.unwrap() / load - 1.0).abs() < 1e-6;
         let (fault, unusable, torque) = checked(|_, load| load);
@@ -695,7 +689,16 @@ mod tests {
         assert!(fault == Some(FaultName::TorqueSign) && !unusable && near(torque));
         let ratio = catalogue_drive().ratio;
         let (fault, unusable, torque) = checked(|_, load| load / ratio.abs());
-        assert!(fault == Some(FaultName::TorqueScale) && !unusable && near(torque));
+        assert!(fault == Some(FaultName::UnitMismatch) && unusable && torque.is_none());
+        // All units are told that explain it, the one that explains most first.
+        let nominal = catalogue_drive();
+        let mut hundredths = recording(&nominal, |_, load| 100.0 * load);
+        let said = check_torque(&mut hundredths, &nominal, None).unwrap();
+        let of_shaft = format!("if it is in N.m/{}: nothing says so", nominal.ratio.abs());
+        assert!(
+            said.contains("if it is in N.cm, ") && said.contains(&of_shaft) && said.contains("=NAME:N.cm,"),
+            "{said}"
+        );
         // A unit that nothing says is not taken for one, nor is a drive nine times as soft.
         let (fault, unusable, torque) = checked(|_, load| load / 0.112_985);
         assert!(fault == Some(FaultName::UnitMismatch) && unusable && torque.is_none());
