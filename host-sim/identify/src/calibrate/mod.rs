@@ -613,7 +613,7 @@ fn set_anew(files: &[Recording], prior: &Prior<'_>) -> Option<Vec<Recording>> {
     }
     let anew: Vec<Recording> = files.iter().flat_map(|file| by_zeros(file, |_| true)).collect();
     let recorded = Recorded::of(&anew, prior);
-    if !recorded.has_torque || recorded.each_keeps_to_one_load {
+    if recorded.each_keeps_to_one_load {
         return None;
     }
     let rows = settled(&anew, prior, &recorded);
@@ -1100,8 +1100,8 @@ fn remarks(
         play_of_a_millisecond_arcsec.map(note_of_one_pace),
         said(
             !recorded.has_torque,
-            "no torque was recorded: the table holds for no load alone, and at any other the core says that it is \
-             outside of the table",
+            "no torque was recorded: the table holds under the loads of these rows alone, whose wind-up, an arm's too, \
+             stands in it as 0 N·m; at any other the core says that it is outside of the table",
         ),
     ];
     remarks.into_iter().flatten().collect()

@@ -269,6 +269,24 @@ fn sessions_that_were_set_to_zero_anew_have_zeros_of_their_own() {
     }
 }
 
+/// Also where nothing loads the drive, or nobody read what does.
+#[test]
+fn sessions_without_a_torque_have_zeros_of_their_own() {
+    let law = |psi: f64, _: f64, _: f64, way: f64| 20.0 * (2.0 * psi).sin() - 12.0 * way;
+    let mut log = recording(1, law);
+    log.sessions = (1..)
+        .zip([0.0, 80.0, -60.0])
+        .map(|(seed, zero)| {
+            let mut session = recording(seed, law).sessions.remove(0);
+            session.error_rad.iter_mut().for_each(|error| *error += zero / ARCSEC_PER_RAD);
+            Session { torque_n_m: None, ..session }
+        })
+        .collect();
+    let made = calibrate(&[log], &by_ratio()).unwrap().calibration;
+    assert!(made.notes.iter().any(|note| note == SET_ANEW) && kept(&made).contains(&"play"), "{:?}", made.parts);
+    assert!(made.held_out.rms_after_arcsec < 2.5, "{:?}", made.held_out);
+}
+
 /// Set to its mark again before the next session.
 #[test]
 fn an_index_that_is_lost_to_the_end_of_a_session_costs_a_table_nothing() {
