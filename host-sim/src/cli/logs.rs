@@ -11,8 +11,8 @@ pub(super) struct LogOptions {
     /// Names and units of columns that are not called time_s, generator_rad, output_rad, error_arcsec, torque_n_m,
     /// temperature_c, orientation_rad: generator=wave_gen_turns:turn,error=error_arcsec:arcsec; by number, with sign
     /// and gain: generator=#1:count/16777216,torque=#4:-N.m. Units: rad, deg, gon, turn, arcmin, arcsec, mrad, count/N,
-    /// s, ms, us, ns, min, h, iso, N.m, N.cm, N.mm, mN.m, kN.m, lbf.in, lbf.ft, A*K, mA*K, V*K, C, K, F;
-    /// `flexspline look FILE` proposes the mapping [default: these names]
+    /// s, ms, us, ns, min, h, iso, N.m, N.cm, N.mm, mN.m, kN.m, lbf.in, lbf.ft, kgf.cm, kgf.m, ozf.in, A*K, mA*K, V*K,
+    /// C, K, F; `flexspline look FILE` proposes the mapping [default: these names]
     #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true)]
     columns: String,
     /// Rows in a second, Hz, where a file has no time [default: no time]

@@ -57,6 +57,12 @@ table! {
         PoundInch = (Family::Torque, &["lbf.in", "in.lbf", "in-lb", "lb-in", "lbf-in"], POUND_FORCE_N * 0.0254),
         /// lbf.ft
         PoundFoot = (Family::Torque, &["lbf.ft", "ft.lbf", "ft-lb", "lb-ft", "lbf-ft"], POUND_FORCE_N * 0.3048),
+        /// kgf.cm
+        KilogramCentimetre = (Family::Torque, &["kgf.cm", "kg.cm"], KILOGRAM_FORCE_N * 1e-2),
+        /// kgf.m
+        KilogramMetre = (Family::Torque, &["kgf.m", "kg.m"], KILOGRAM_FORCE_N),
+        /// ozf.in
+        OunceInch = (Family::Torque, &["ozf.in", "oz.in", "oz-in"], POUND_FORCE_N / 16.0 * 0.0254),
         /// A: a current; its torque for an ampere has to be said.
         Ampere = (Family::Torque, &["A"], 1.0),
         /// mA, likewise.
@@ -72,7 +78,9 @@ table! {
     }
 }
 
-/// The pound-force, N: 0.453 592 37 kg (1959) times the standard acceleration 9.806 65 m/s².
+/// The kilogram-force, N: by the standard acceleration, 9.806 65 m/s².
+const KILOGRAM_FORCE_N: f64 = 9.806_65;
+/// The pound-force, N: 0.453 592 37 kg (1959) times that.
 const POUND_FORCE_N: f64 = 4.448_221_615_260_5;
 
 /// The quantity that a unit measures.
@@ -103,8 +111,7 @@ impl Family {
 }
 
 /// Units at the end of a name that are written otherwise there.
-const IN_NAMES: [(&str, Unit); 4] =
-    [("_n_m", Unit::NewtonMetre), ("_nm", Unit::NewtonMetre), ("_c", Unit::Celsius), ("_k", Unit::Kelvin)];
+const IN_NAMES: [(&str, Unit); 2] = [("_c", Unit::Celsius), ("_k", Unit::Kelvin)];
 /// Words at the end of a name that are more often something else: `torque_min`, `q_d`.
 const NOT_IN_NAMES: [&str; 6] = ["min", "h", "d", "F", "day", "iso"];
 
@@ -174,8 +181,14 @@ impl Unit {
         if let Some((_, unit)) = IN_NAMES.iter().find(|(end, _)| column.ends_with(end)) {
             return Some(*unit);
         }
+        // `torque_kgf_cm`, `torque_knm`, `load_Lb_In`: all that a torque's unit may lack in a name is dots and case.
+        let plain = |text: &str| text.chars().filter(char::is_ascii_alphabetic).collect::<String>().to_lowercase();
+        let words = column.match_indices('_').map(|(at, _)| plain(&column[at..]));
+        let torques = || Family::Torque.units().filter(|unit| unit.needs_gain().is_none());
+        let of_torque = |word: String| torques().find(|unit| unit.row().1.iter().any(|text| plain(text) == word));
         let (_, word) = column.rsplit_once('_')?;
-        Unit::written(word).filter(|_| !NOT_IN_NAMES.contains(&word))
+        let written = Unit::written(word).filter(|_| !NOT_IN_NAMES.contains(&word));
+        written.or_else(|| words.filter_map(of_torque).last())
     }
 }
 
@@ -346,6 +359,10 @@ mod tests {
             ("Winkel [°]", Unit::Degree),
             ("load (Nm)", Unit::NewtonMetre),
             ("torque_Nm", Unit::NewtonMetre),
+            ("torque_n_m", Unit::NewtonMetre),
+            ("torque_knm", Unit::KilonewtonMetre),
+            ("load_kgf_cm", Unit::KilogramCentimetre),
+            ("joint_torque_ozin", Unit::OunceInch),
             ("t_ms", Unit::Millisecond),
         ] {
             assert_eq!(Unit::in_name(name), Some(unit), "{name}");
