@@ -640,9 +640,13 @@ pub(crate) fn on_zero_of(table: &Table<'_>, mut log: Recording) -> Recording {
         let found = (rows.rows.len() >= FEWEST_ROWS).then(|| zero::align(table, &rows, recorded.scales.friction_n_m));
         let starts_elsewhere = |found: &Alignment| {
             let deg = found.generator_zero_deg;
-            let (off_deg, leaves) = if found.by_output { (deg, 1.0) } else { (zero::within(deg, 360.0), LEAVES) };
+            let (off_deg, most_left) = if found.by_output {
+                (deg, found.left_before_arcsec)
+            } else {
+                (zero::within(deg, 360.0), LEAVES * found.left_before_arcsec.min(found.left_by_turns_arcsec))
+            };
             let other = off_deg.abs() > found.generator_half_width_deg + LEAST_START_DEG;
-            found.told && other && found.left_after_arcsec < leaves * found.left_before_arcsec
+            found.told && other && found.left_after_arcsec < most_left
         };
         if let Some(found) = found.filter(starts_elsewhere) {
             let zero_rad = found.generator_zero_deg.to_radians();

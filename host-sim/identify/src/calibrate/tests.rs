@@ -701,6 +701,23 @@ fn an_arm_in_one_posture_leaves_its_spring_in_the_interval() {
     }
 }
 
+/// What a weight does is no mark on the output: without it, or in another posture, the generator's zero stays.
+#[test]
+fn an_arm_in_another_posture_did_not_start_elsewhere() {
+    let log = |load: f64, turned: f64| {
+        let mut log = arm(|out, _| 15.0 * (2.0 * RATIO * out).sin() + 12.0 * load * (out + turned).sin());
+        log.sessions[0].torque_n_m = None;
+        up_to(log, 3.0)
+    };
+    let made = calibrate(&[log(25.0, 0.2)], &by_ratio()).unwrap();
+    let table = Table::check(&made.table.image).unwrap();
+    for (load, turned) in [(0.0, 0.0), (12.0, 1.9), (25.0, 1.9), (25.0, 2.5), (25.0, -0.6), (25.0, 3.3)] {
+        let other = log(load, turned);
+        let on_one = on_zero_of(&table, other.clone());
+        assert_eq!(on_one.sessions[0].generator_rad, other.sessions[0].generator_rad, "{load}: {:?}", on_one.notes);
+    }
+}
+
 /// A spring of the model that is 2.75 times too soft for an arm: the curve of the output takes it back, and there is a
 /// table.
 #[test]

@@ -52,6 +52,9 @@ pub struct Alignment {
     pub left_before_arcsec: f64,
     /// With the phase found.
     pub left_after_arcsec: f64,
+    /// With the whole turns next to it, which no wave of the generator tells.
+    #[serde(skip)]
+    pub left_by_turns_arcsec: f64,
     /// Whether these logs tell it; then it is used.
     pub told: bool,
     /// Whether the output, which reads absolutely, says the turn.
@@ -244,6 +247,7 @@ pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignm
         repeats_deg: repeats.to_degrees(),
         left_before_arcsec: rms(0.0),
         left_after_arcsec: rms(zero),
+        left_by_turns_arcsec: rms(TAU * (zero / TAU).round()),
         told: !flat && !doubtful,
         by_output: reads,
         why,
