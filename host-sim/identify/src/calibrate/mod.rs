@@ -1098,6 +1098,11 @@ fn remarks(
              several loads in one log",
         ),
         said(
+            recorded.sessions_keep_to_one_load && model.of(PartName::WindUp).is_some(),
+            "each session keeps to one load: its wind-up is told from the zero of the output only if that was the same \
+             in all of them, which these rows do not show; give each session as a log of its own if it was not",
+        ),
+        said(
             recorded.lacks(PartName::Play, prior).is_some(),
             "one direction was recorded: after a reversal the table says nothing new of the play",
         ),

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::ops::Range;
+use std::slice::from_ref;
 
 use super::Model;
 use super::folds::{Folds, Row};
@@ -65,6 +66,8 @@ pub(super) struct Recorded {
     pub has_torque: bool,
     /// Whether no log has two loads, though the logs together do: then a load is as good as a zero.
     pub each_keeps_to_one_load: bool,
+    /// Whether none of several sessions has two: then a load is as good as a zero unless the output kept its own.
+    pub sessions_keep_to_one_load: bool,
     pub has_temperature: bool,
     /// Shares of the turns of generator and output with rows in them.
     pub generator_share: f64,
@@ -128,8 +131,8 @@ impl Recorded {
         let periods: Vec<f64> =
             sessions().filter_map(|s| s.time_s.as_ref()).flat_map(|t| t.windows(2).map(|p| p[1] - p[0])).collect();
         let period_s = quantile_of(&mut sampled(&periods), 0.5);
-        let keeps_to_one_load = |file: &Recording| {
-            let loads = file.sessions.iter().flat_map(|session| session.torque_n_m.iter().flatten().copied());
+        let keep_to_one_load = |sessions: &[Session]| {
+            let loads = sessions.iter().flat_map(|session| session.torque_n_m.iter().flatten().copied());
             let (low, high) = least_and_most(loads);
             high - low < super::LEAST_FRICTION * most
         };
@@ -152,7 +155,12 @@ impl Recorded {
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             one_pace,
             has_torque,
-            each_keeps_to_one_load: has_torque && files.len() > 1 && files.iter().all(keeps_to_one_load),
+            each_keeps_to_one_load: has_torque
+                && files.len() > 1
+                && files.iter().all(|f| keep_to_one_load(&f.sessions)),
+            sessions_keep_to_one_load: has_torque
+                && sessions().count() > 1
+                && sessions().all(|s| keep_to_one_load(from_ref(s))),
             has_temperature,
             generator_share: share_with_rows(without_rows(angles(1.0), 24), 24),
             output_share,
