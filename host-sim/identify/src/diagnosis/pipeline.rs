@@ -259,10 +259,6 @@ impl<'a> Subject<'a> {
     fn prior<'t>(&'t self, known: Option<&'t Table<'t>>) -> Prior<'t> {
         match known.or(self.table.as_ref()) {
             Some(table) => Prior::of_table(table, self.kind),
-            // A model that was made of these rows was not known before them.
-            None if self.note.is_some() => {
-                Prior { hash: self.hash(), ..Prior::of_ratio(self.nominal.ratio, self.kind) }
-            }
             None => Prior { hash: self.hash(), ..Prior::of_nominal(self.nominal.clone(), CATALOGUE_DRIVE, self.kind) },
         }
     }
@@ -648,6 +644,23 @@ mod tests {
             [psi, 6.0 * load - 20.0 * way + 20.0 * (2.0 * psi + 0.4).sin(), load]
         });
         assert_eq!(done.diagnosis.finding, Finding::NothingFound, "{}", done.diagnosis.text());
+    }
+
+    /// A load in steps, N·m.
+    fn in_steps(k: f64) -> f64 {
+        [12.0, -24.0, 32.0, -40.0, 20.0, -8.0][k as usize / 200 % 6]
+    }
+
+    /// A load centres a wheel, and moves no teeth; without clearance both flanks bind.
+    #[test]
+    fn a_wave_that_the_load_halves_is_an_eccentricity() {
+        let nominal = Nominal { backlash_arcsec: 0.0, ..catalogue_drive() };
+        let (_, done) = by_ratio_and(Some(nominal.clone()), |k, _| {
+            let (psi, load) = (0.05 * k, in_steps(k));
+            let wave = 20.0 * (2.0 * psi * (1.0 - 1.0 / nominal.ratio)).sin() / (1.0 + load.abs() / 25.0);
+            [psi, nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + wave, load]
+        });
+        assert!(done.diagnosis.text().contains("  circular_spline_eccentricity ("), "{}", done.diagnosis.text());
     }
 
     /// Without a load the motion alone chooses the flank, and friction that is stated is one with play.
