@@ -158,11 +158,6 @@ impl Nominal {
         angle_rad.copysign(torque_n_m) * ARCSEC_PER_RAD
     }
 
-    /// Wind-up for 1 N·m more at a torque, arcsec.
-    pub(crate) fn slope_arcsec(&self, torque_n_m: f64) -> f64 {
-        self.wind_up_arcsec(torque_n_m + 0.5) - self.wind_up_arcsec(torque_n_m - 0.5)
-    }
-
     /// Kinematic error at a generator angle, arcsec.
     pub fn harmonics_arcsec(&self, generator_rad: f64) -> f64 {
         self.harmonics

@@ -245,10 +245,14 @@ impl Base {
         // Nor does a catalogue print the drag of the output, which winds a drive up against its motion: by as much
         // under every load, as lost motion is, or less where the load has made it stiffer. Of a friction that is stated
         // the rows say whether it does; they do not where the motion alone chooses the flank.
-        let winds = |torque: f64| -nominal.ratio.signum() * nominal.slope_arcsec(torque);
-        let against: Vec<f64> = rows.direction.iter().map(|way| winds(0.0) * way).collect();
-        let under_load = rows.torque.iter().zip(&rows.direction).map(|(torque, way)| winds(*torque) * way).collect();
         let stated_n_m = nominal.friction_torque_n_m;
+        // As far as friction takes a spring it may have another slope than where the load alone would.
+        let by_n_m = -nominal.ratio.signum() * if stated_n_m > 0.0 { stated_n_m } else { 0.5 };
+        let winds = |torque: f64, way: &f64| {
+            (nominal.wind_up_arcsec(torque + by_n_m * way) - nominal.wind_up_arcsec(torque)) / by_n_m.abs()
+        };
+        let against: Vec<f64> = rows.direction.iter().map(|way| winds(0.0, way)).collect();
+        let under_load = rows.torque.iter().zip(&rows.direction).map(|(torque, way)| winds(*torque, way)).collect();
         let (drag_n_m, winds_up) = if nominal.teeth.is_none() || stated_n_m == 0.0 {
             (DRAG_OF_LOAD * rows.load_scale(), true)
         } else {

@@ -651,6 +651,19 @@ mod tests {
         [12.0, -24.0, 32.0, -40.0, 20.0, -8.0][k as usize / 200 % 6]
     }
 
+    /// Friction takes a spring over a corner of its stiffness: there it gives more one way than the other.
+    #[test]
+    fn a_corner_of_the_spring_within_friction_is_no_cause() {
+        let stiffness = vec![[0.0, 2e4], [8.0, 3e4]];
+        let nominal = Nominal { stiffness, friction_torque_n_m: 2.0, ..catalogue_drive() };
+        let (_, done) = by_ratio_and(Some(nominal.clone()), |k, _| {
+            let ((way, psi), load) = (there_and_back(k), in_steps(k));
+            let carried = nominal.wind_up_arcsec(load - 2.0 * way * nominal.ratio.signum());
+            [psi, nominal.harmonics_arcsec(psi) + carried + 0.5 * nominal.backlash_arcsec * load.signum(), load]
+        });
+        assert_eq!(done.diagnosis.finding, Finding::NothingFound, "{}", done.diagnosis.text());
+    }
+
     /// A load centres a wheel, and moves no teeth; without clearance both flanks bind.
     #[test]
     fn a_wave_that_the_load_halves_is_an_eccentricity() {

@@ -642,12 +642,8 @@ fn teeth_that_slide_into_the_next_space_between_two_recordings_have_ratcheted() 
     sessions[2].error_rad.iter_mut().enumerate().for_each(|(k, error)| *error -= pitch + slide(k));
     sessions[3].error_rad.iter_mut().for_each(|error| *error -= 2.0 * pitch);
     let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap().0;
-    assert_eq!(
-        (diagnosis.verdict, names(&diagnosis)),
-        (Verdict::Explained, vec![CauseName::Ratcheting]),
-        "{}",
-        diagnosis.text()
-    );
+    let found = (diagnosis.verdict, names(&diagnosis));
+    assert_eq!(found, (Verdict::Explained, vec![CauseName::Ratcheting]), "{}", diagnosis.text());
     let slipped = diagnosis.causes[0].parameters["jump_arcsec"];
     assert!((slipped.value + 2.0 * pitch * 206_264.8).abs() < 15.0 && slipped.std < 15.0, "{slipped:?}");
 }
@@ -784,12 +780,8 @@ fn a_lost_index_and_a_drift_are_told_of_the_data_beside_a_cause() {
     let faults_of = |what: &str, sessions: &[Session]| {
         let found = diagnose(sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap().0;
         let said = (found.verdict, names(&found), found.unexplained.len());
-        assert_eq!(
-            said,
-            (Verdict::Explained, vec![CauseName::OutputEncoderEccentricity], 0),
-            "{what}: {}",
-            found.text()
-        );
+        let told = (Verdict::Explained, vec![CauseName::OutputEncoderEccentricity], 0);
+        assert_eq!(said, told, "{what}: {}", found.text());
         found.fitted_faults
     };
     let sessions = recorded(&[encoder], 5, 3000, 100.0, 2.0, 72);

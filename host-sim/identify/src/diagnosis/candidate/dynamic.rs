@@ -105,9 +105,8 @@ fn gravity_torque(play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>
         .adds_load(move |on, shape| load(on, of(shape)))
         .led_by(
             move |on, _| {
-                let rows = on.rows;
-                let slope = |k: usize| on.nominal.slope_arcsec(rows.torque[k]);
-                let at = |k: usize| rows.output[k] + rows.orientation[k];
+                let slope = |k: usize| on.wound_up(k, on.rows.torque[k] + 1.0);
+                let at = |k: usize| on.rows.output[k] + on.rows.orientation[k];
                 vec![
                     main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale).called(SINE),
                     main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale).called(COSINE),
