@@ -23,7 +23,6 @@
 //! }
 //! # Ok::<(), &str>(())
 //! ```
-//!
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(

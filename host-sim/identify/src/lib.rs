@@ -24,7 +24,7 @@ macro_rules! table {
             #[allow(dead_code, reason = "not every table is gone through")]
             $vis const ALL: [$Name; [$($Name::$variant),*].len()] = [$($Name::$variant),*];
 
-            const fn row(self) -> $Row {
+            pub(crate) const fn row(self) -> $Row {
                 match self {
                     $($Name::$variant => $row,)*
                     $($Name::$other(of) => of.$method(),)?

@@ -131,11 +131,12 @@ impl Recorded {
         let periods: Vec<f64> =
             sessions().filter_map(|s| s.time_s.as_ref()).flat_map(|t| t.windows(2).map(|p| p[1] - p[0])).collect();
         let period_s = quantile_of(&mut sampled(&periods), 0.5);
-        let keep_to_one_load = |sessions: &[Session]| {
+        let one_load = |sessions: &[Session]| {
             let loads = sessions.iter().flat_map(|session| session.torque_n_m.iter().flatten().copied());
             let (low, high) = least_and_most(loads);
             high - low < super::LEAST_FRICTION * most
         };
+        let several = |count: usize| has_torque && count > 1;
         let output = || angles(1.0 / prior.nominal.ratio);
         let output_share = share_with_rows(without_rows(output(), PARTS_OF_A_TURN), PARTS_OF_A_TURN);
         // Nearer to a row no wave can come to zero.
@@ -155,12 +156,8 @@ impl Recorded {
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             one_pace,
             has_torque,
-            each_keeps_to_one_load: has_torque
-                && files.len() > 1
-                && files.iter().all(|f| keep_to_one_load(&f.sessions)),
-            sessions_keep_to_one_load: has_torque
-                && sessions().count() > 1
-                && sessions().all(|s| keep_to_one_load(from_ref(s))),
+            each_keeps_to_one_load: several(files.len()) && files.iter().all(|file| one_load(&file.sessions)),
+            sessions_keep_to_one_load: several(sessions().count()) && sessions().all(|of| one_load(from_ref(of))),
             has_temperature,
             generator_share: share_with_rows(without_rows(angles(1.0), 24), 24),
             output_share,

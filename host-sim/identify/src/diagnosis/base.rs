@@ -42,11 +42,6 @@ table! {
 }
 
 impl PlayLaw {
-    /// Its name in a file.
-    pub const fn as_str(self) -> &'static str {
-        self.row()
-    }
-
     /// Which flank carries in each row, −1 to 1, under a torque.
     pub(crate) fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {
         // Before the first load: where the friction of a moving output puts it.
@@ -206,7 +201,7 @@ impl Base {
         let harmonics: Vec<f64> = rows.generator.iter().map(|psi| nominal.harmonics_arcsec(*psi)).collect();
         let half_backlash = 0.5 * nominal.backlash_arcsec;
         let used: Vec<usize> = rows.sessions_used().flatten().collect();
-        let free = if laws.len() > 1 { of_any_drive(rows, &used) } else { FreeSpan::default() };
+        let free = of_any_drive(rows, &used);
         let mut best: Option<(f64, PlayLaw, Vec<f64>)> = None;
         for &law in laws {
             let flank = law.flanks(rows, &rows.torque, nominal);
@@ -257,7 +252,6 @@ impl Base {
             (DRAG_OF_LOAD * rows.load_scale(), true)
         } else {
             let of = |column: &[f64]| -> Vec<f64> { used.iter().map(|k| column[*k]).collect() };
-            let free = of_any_drive(rows, &used);
             let loaded = free.beyond([of(&wind_up), of(&flank)]);
             let freed = |column: &[f64]| loaded.freed(free.freed(of(column)));
             let (left, drag, all) = (freed(&less(&rows.error, &prediction)), freed(&against), of(&against));

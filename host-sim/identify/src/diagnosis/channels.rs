@@ -21,8 +21,8 @@ use super::noise::white_level;
 use super::rows::{Rows, mean, quantile, rms, robust_std};
 use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, MeasuredError, Measures, Quantity, Recording, Session, Treatment, least_and_most,
-    other_reading, throughout,
+    ColumnMap, Fault, FaultName, MeasuredError, Measures, Quantity, Recording, Session, Treatment, Unit,
+    least_and_most, other_reading, throughout,
 };
 use crate::misfit::about_mean;
 use crate::nominal::Nominal;
@@ -193,15 +193,10 @@ impl TorqueEffect {
 /// How a torque of which N·m were said may be meant, as a mapping says it, with its factor: in another unit, of the
 /// generator's shaft or divided by the ratio twice, and all of them turned round.
 fn readings(ratio: f64) -> impl Iterator<Item = (String, f64)> {
-    let ratio = ratio.abs();
     let shafts = [(format!("N.m*{ratio}"), ratio), (format!("N.m/{ratio}"), 1.0 / ratio)];
-    let meant = shafts.into_iter().chain(UNITS.map(|(unit, factor)| (unit.to_owned(), factor)));
-    meant.flat_map(|(unit, factor)| [(format!("-{unit}"), -factor), (unit, factor)])
+    let units = Unit::of_a_torque().map(|unit| (unit.name().to_owned(), unit.factor()));
+    shafts.into_iter().chain(units).flat_map(|(unit, factor)| [(format!("-{unit}"), -factor), (unit, factor)])
 }
-
-/// Units that a torque may be in though N·m was said, as a mapping names them, in N·m.
-const UNITS: [(&str, f64); 6] =
-    [("N.m", 1.0), ("N.cm", 1e-2), ("mN.m", 1e-3), ("kN.m", 1e3), ("lbf.in", 0.112_985), ("N.m*9.80665", 9.806_65)];
 
 /// Holds the torque against what it should do; turned round where that explains it; left out where it does nothing, or
 /// where it looks like another unit or shaft. Gives why the data are unusable, where they are.
@@ -233,7 +228,7 @@ pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
         let fits = of_this_drive(effect.share) && (!too_soft || of_this_drive(effect.wind_up));
         seen(effect) && fits && effect.share > CERTAIN * effect.std && effect.left < most * recorded.left.min(none)
     };
-    let tried = readings(nominal.ratio).map(|(unit, factor)| (unit, factor, TorqueEffect::by(&sampled, factor)));
+    let tried = readings(nominal.ratio.abs()).map(|(unit, factor)| (unit, factor, TorqueEffect::by(&sampled, factor)));
     let mut meant: Vec<_> = tried.filter(|tried| explains(tried, &recorded, none)).collect();
     meant.sort_by(|a, b| a.2.left.total_cmp(&b.2.left));
     // Where each session keeps to one load, a zero of its own hides what that does; of three and more a line shows.

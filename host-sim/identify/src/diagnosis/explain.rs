@@ -102,11 +102,11 @@ impl<'a> Explanation<'a> {
             }
             let round = if step.round > 0 { format!(", round {}", step.round) } else { String::new() };
             let against = step.against.map_or_else(String::new, |label| format!(", against {label}"));
-            let _ = writeln!(text, "  {}{round}{against}:", step.stage.words());
+            let _ = writeln!(text, "  {}{round}{against}:", step.stage.row());
             for judged in &step.gates {
                 let sign = if judged.passed { '+' } else { '-' };
                 let numbers = numbers(judged).map_or_else(String::new, |numbers| format!(": {numbers}"));
-                let _ = writeln!(text, "    {sign} it {}{numbers}", judged.gate.asks());
+                let _ = writeln!(text, "    {sign} it {}{numbers}", judged.gate.row());
             }
         }
         for record in &self.record {
@@ -138,12 +138,12 @@ fn not_named(stopped: Option<&Decision>, alike: &[CauseName]) -> String {
     if let Gate::Needs(need) = judged.gate {
         return format!("These data cannot speak of it: {}.", need.missing());
     }
-    let mut text = format!("It is not named: {}", step.stage.words());
+    let mut text = format!("It is not named: {}", step.stage.row());
     match step.against {
         Some(against) if step.stage == Stage::Rival => text += &format!(" ({against})"),
         _ => {}
     }
-    let _ = write!(text, ", it did not hold that it {}", judged.gate.asks());
+    let _ = write!(text, ", it did not hold that it {}", judged.gate.row());
     if let Some(numbers) = numbers(judged) {
         let _ = write!(text, ": {numbers}");
     }

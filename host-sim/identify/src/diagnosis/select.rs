@@ -396,16 +396,13 @@ pub(super) fn settle_each<'l>(problem: &Problem<'_>, selected: Selected<'l>, ane
         let begun = if anew && law.search.lead.is_some() { scaffold.begin(law) } else { Vec::new() };
         let begun = begun.into_iter().map(|places| scaffold.term(law, places));
         let refined = [terms[k].clone()].into_iter().chain(begun).filter_map(|term| scaffold.refine(term));
-        if let Some((term, _)) = refined.max_by(|a, b| evidence_of(a).total_cmp(&evidence_of(b))) {
+        // Less what the freedom of the term costs.
+        let evidence = |(term, fit): &(Term<'_>, Fit)| fit.solution.evidence + term.occam;
+        if let Some((term, _)) = refined.max_by(|a, b| evidence(a).total_cmp(&evidence(b))) {
             terms[k] = term;
         }
     }
     Selected::of(problem, among_each_other(problem, terms))
-}
-
-/// Evidence of a model of which this term came last, less what its freedom costs.
-fn evidence_of((term, fit): &(Term<'_>, Fit)) -> f64 {
-    fit.solution.evidence + term.occam
 }
 
 /// The gates that a term has to pass to keep its place; `least` is the least size that counts, arcsec.

@@ -14,30 +14,15 @@ table! {
     /// Where in the search a decision fell.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
     #[serde(rename_all = "snake_case")]
-    pub enum Stage: &'static str {
-        /// Before the search: can these data speak of the cause at all?
+    pub(crate) enum Stage: &'static str {
         Data = "the data",
-        /// A law is tried at many places, none of them refined.
         Tried = "tried at many places",
-        /// Laws are refined, and compared beside those chosen before.
         Forward = "refined together with the causes chosen before",
-        /// A law that was chosen has to earn its place again beside a later one.
         Backward = "held against what was chosen after it",
-        /// How a law that was chosen stands when the search is over.
         Settled = "at the end of the search",
-        /// What has no name beside a cause must not be too large.
         Understood = "together with unnamed terms",
-        /// Every rival is refitted in the place of a cause.
         Rival = "against its rivals",
-        /// The verdict over all causes together.
         Verdict = "the verdict",
-    }
-}
-
-impl Stage {
-    /// Its words for a reader.
-    pub const fn words(self) -> &'static str {
-        self.row()
     }
 }
 
@@ -45,48 +30,28 @@ table! {
     /// A gate that a law has to pass, and what it asks, as a sentence of which the law is the subject.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "snake_case")]
-    pub enum Gate: &'static str {
-        /// A parameter of the nominal model has left its tolerance, in standard deviations between units.
+    pub(crate) enum Gate: &'static str {
         Tolerance = "takes a parameter of the nominal model out of its tolerance (standard deviations between units)",
-        /// There is room: this many causes, or deviations, are chosen at most.
         Room = "finds room next to the models chosen already",
-        /// Tried at many places it gains as much evidence as the last law that was refined.
         Refined = "gains as much evidence, not yet refined, as the laws that are refined",
-        /// Its signs and sizes make sense.
         Sense = "has signs and sizes that make sense",
-        /// Its deviations are no larger than this share of the law itself.
         Deviations = "is larger than its own deviations (their share of it)",
-        /// Refined it gains any evidence.
         Gain = "gains evidence when it is refined",
-        /// No other law gains more.
         First = "gains more evidence than any other law",
-        /// It gains evidence over the model without it.
         Evidence = "gains evidence over the model without it (natural logarithm)",
-        /// It is large enough, arcsec.
         Size = "is large enough (arcsec rms)",
-        /// It is large enough for a cause that is clear, arcsec.
         SizeIfClear = "is large enough for a cause that is clear (arcsec rms)",
-        /// What nothing else explains of it is larger than what the laws of the other causes may be wrong by, arcsec.
         Alone = "is larger than what the laws of the other causes may be wrong by (arcsec rms)",
-        /// It predicts sessions that it was not fitted to.
         LeftOut = "predicts sessions that it was not fitted to (gain)",
-        /// A line of the generator's angle does not grow with the speed.
         NoGrowthWithSpeed = "does not grow with the speed (growth of its amplitude, standard deviations; negative \
             where it fades)",
-        /// A load that was not recorded may make it: no more is left than this many times the noise.
         LoadKnown = "leaves no more than noise, as a load that was not recorded may make it (times the noise)",
-        /// No line in time that has no name, near its frequency, is as large as this against it.
         NoLineBeside = "does not stand beside a line in time near its frequency that nothing in the drive drives (its \
             size as a share of the cause)",
-        /// It is this many times its own uncertainty.
         KnownWell = "is well determined next to unnamed terms (times its own uncertainty)",
-        /// The best known of its sizes is this many times its standard deviation.
         ToldFromZero = "has a size that differs from zero (times its standard deviation)",
-        /// Rivals raise the misfit by this much.
         ToldApart = "is distinguishable from a rival (rise of the misfit with the rival in its place)",
-        /// As a rival it would lower the misfit against the cause that was named.
         AsRival = "tells the data better in the place of a cause that was named (rise of the misfit)",
-        /// All causes together predict sessions left out no worse than the nominal model, arcsec rms.
         NoWorse = "predicts sessions left out, with the others named (arcsec rms)",
         ;
         /// The data hold what it needs.
@@ -95,18 +60,11 @@ table! {
     }
 }
 
-impl Gate {
-    /// What it asks, as a sentence of which the law is the subject.
-    pub const fn asks(self) -> &'static str {
-        self.row()
-    }
-}
-
 /// A gate with what came to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Judged {
     /// The gate.
-    pub gate: Gate,
+    pub(crate) gate: Gate,
     /// The value, if it is a number.
     pub value: Option<f64>,
     /// The limit.
@@ -120,17 +78,17 @@ pub struct Judged {
 
 impl Judged {
     /// The value has to be above the limit.
-    pub fn above(gate: Gate, value: f64, limit: f64) -> Judged {
+    pub(crate) fn above(gate: Gate, value: f64, limit: f64) -> Judged {
         Judged { gate, value: Some(value), limit: Some(limit), is_below: false, passed: value > limit }
     }
 
     /// The value has to be below the limit.
-    pub fn below(gate: Gate, value: f64, limit: f64) -> Judged {
+    pub(crate) fn below(gate: Gate, value: f64, limit: f64) -> Judged {
         Judged { is_below: true, passed: value < limit, ..Judged::above(gate, value, limit) }
     }
 
     /// A value that is no number.
-    pub fn plain(gate: Gate, passed: bool) -> Judged {
+    pub(crate) fn plain(gate: Gate, passed: bool) -> Judged {
         Judged { gate, value: None, limit: None, is_below: false, passed }
     }
 }
@@ -146,7 +104,7 @@ pub struct Decision {
     /// The law that was judged.
     pub label: Label,
     /// Where.
-    pub stage: Stage,
+    pub(crate) stage: Stage,
     /// In which round of the search, from 1; 0 before it.
     pub round: usize,
     /// What it was held against, if that was another law.
@@ -182,13 +140,13 @@ impl Trace {
     }
 
     /// Decisions on a cause, in their order.
-    pub fn of(&self, cause: CauseName) -> impl DoubleEndedIterator<Item = &Decision> {
+    pub(crate) fn of(&self, cause: CauseName) -> impl DoubleEndedIterator<Item = &Decision> {
         self.steps.iter().filter(move |step| step.label == Label::Cause(cause))
     }
 
     /// The decision that says why a cause was not named: of the last stage that it came to, the one of the law that
     /// came farthest. None if all gates let it through to the end.
-    pub fn stopped(&self, cause: CauseName) -> Option<&Decision> {
+    pub(crate) fn stopped(&self, cause: CauseName) -> Option<&Decision> {
         let search = |step: &&Decision| step.stage != Stage::Rival;
         let last = self.of(cause).rev().find(search)?;
         if last.passed() {
@@ -206,7 +164,7 @@ impl Trace {
 
     /// The decisions that say what became of a cause: those of the last round that it was judged in, and from any round
     /// those where it was chosen, given up, or held against a rival.
-    pub fn telling(&self, cause: CauseName) -> Vec<&Decision> {
+    pub(crate) fn telling(&self, cause: CauseName) -> Vec<&Decision> {
         let last = self.of(cause).map(|step| step.round).max().unwrap_or(0);
         let tells = |step: &&Decision| {
             step.round == last || !matches!(step.stage, Stage::Tried | Stage::Forward) || step.passed()

@@ -20,7 +20,7 @@ use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
 use super::{Search, Settings, experiment, held_out, remainder, rivals, with_speed};
 use crate::causes::{CauseName, Kin, ParameterName};
-use crate::measurement::FaultName;
+use crate::measurement::{FaultName, whole_pitches};
 use crate::nominal::{Nominal, OF_TWO_LOBES};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -232,7 +232,6 @@ fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Para
     let covariance = selected.fit.solution.covariance();
     let n = coefficients.len();
     let at_term = term.map(|k| selected.fit.starts[k]);
-    let pitch_arcsec = problem.on.nominal.gear().tooth_pitch_rad.map_or(0.0, |pitch| pitch * ARCSEC_PER_RAD);
     let mut zeros: Vec<Parameter> = Vec::new();
     let (mut place, mut before) = (0, 0.0);
     for session in 0..rows.sessions.len() {
@@ -251,7 +250,10 @@ fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Para
         let zero = Parameter { value, std: variance.max(0.0).sqrt() };
         let jump = of_law.map_or(0.0, |i| coefficients[i]) - before;
         before = of_law.map_or(before, |i| coefficients[i]);
-        if session > 0 && !rows.zeros.contains(&session) && is_whole_pitches(jump, zero.std, pitch_arcsec) {
+        // Then teeth may have skipped while nobody recorded.
+        let [jump_rad, std_rad] = [jump, zero.std].map(|arcsec| arcsec / ARCSEC_PER_RAD);
+        let pitches = whole_pitches(jump_rad, &problem.on.nominal.gear(), BESIDE_PITCHES, INTERVAL * std_rad);
+        if session > 0 && !rows.zeros.contains(&session) && pitches.is_some() {
             return Vec::new();
         }
         zeros.push(zero);
@@ -278,14 +280,6 @@ fn fitted_faults(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<FittedFa
 /// Whether the zero of a session is known to be another one: what the laws leave may pass for one that is hardly there.
 fn is_another_one(zeros: &[Parameter]) -> bool {
     zeros.iter().any(|zero| zero.value.abs() > SIZE_KNOWN * zero.std)
-}
-
-/// Whether a zero moves by one tooth pitch or several, as well as it is known: then teeth may have skipped while nobody
-/// recorded.
-fn is_whole_pitches(jump_arcsec: f64, std_arcsec: f64, pitch_arcsec: f64) -> bool {
-    let pitches = (jump_arcsec / pitch_arcsec.max(f64::MIN_POSITIVE)).round();
-    let off = (jump_arcsec - pitches * pitch_arcsec).abs();
-    pitch_arcsec > 0.0 && pitches != 0.0 && off < (BESIDE_PITCHES * pitch_arcsec).max(INTERVAL * std_arcsec)
 }
 
 /// Whether causes explain the error: what is left is near the noise, and in sessions left out the model with them beats
@@ -566,13 +560,6 @@ mod tests {
         let zeros = |values: [f64; 3]| values.map(|value| Parameter { value, std: 4.6 });
         assert!(!is_another_one(&zeros([0.0, -15.0, -15.5])));
         assert!(is_another_one(&zeros([0.0, -15.0, 130.0])));
-    }
-
-    #[test]
-    fn a_zero_that_moves_by_whole_pitches_may_be_teeth_that_skipped() {
-        assert!(is_whole_pitches(6416.0, 2.0, 6416.2) && is_whole_pitches(-12_810.0, 2.0, 6416.2));
-        assert!(!is_whole_pitches(0.4, 2.0, 6416.2) && !is_whole_pitches(5900.0, 2.0, 6416.2));
-        assert!(!is_whole_pitches(300.0, 2.0, 0.0), "teeth that nobody knows");
     }
 
     #[test]

@@ -10,58 +10,37 @@ table! {
     /// used inside (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its gain: a
     /// turn, a N·m.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[allow(missing_docs, reason = "a row begins with the name in a mapping")]
     pub enum Unit: (Family, &'static [&'static str], f64) {
-        /// rad
         Radian = (Family::Angle, &["rad"], 1.0),
-        /// deg
         Degree = (Family::Angle, &["deg", "°", "degree", "degrees"], TAU / 360.0),
         /// gon: 400 make a turn
         Gon = (Family::Angle, &["gon"], TAU / 400.0),
-        /// turn
         Turn = (Family::Angle, &["turn", "turns", "rev", "revs"], TAU),
-        /// arcmin
         Arcminute = (Family::Angle, &["arcmin"], TAU / 21_600.0),
-        /// arcsec
         Arcsecond = (Family::Angle, &["arcsec"], TAU / 1_296_000.0),
-        /// mrad
         Milliradian = (Family::Angle, &["mrad"], 1e-3),
         /// Counts of an encoder; how many make a turn has to be said.
         Count = (Family::Angle, &["count", "counts", "cnt", "inc", "incs", "tick", "ticks"], TAU),
-        /// s
         Second = (Family::Time, &["s", "sec", "seconds"], 1.0),
-        /// ms
         Millisecond = (Family::Time, &["ms"], 1e-3),
-        /// us
         Microsecond = (Family::Time, &["us", "µs", "μs"], 1e-6),
-        /// ns
         Nanosecond = (Family::Time, &["ns"], 1e-9),
-        /// min
         Minute = (Family::Time, &["min"], 60.0),
-        /// h
         Hour = (Family::Time, &["h"], 3600.0),
         /// d: days, as spreadsheets count time.
         Day = (Family::Time, &["d", "days", "day"], 86_400.0),
         /// Date and time, or time of day, as text.
         Iso = (Family::Time, &["iso"], 1.0),
-        /// N.m
         NewtonMetre = (Family::Torque, &["N.m", "Nm", "N·m", "N*m", "N-m", "N m"], 1.0),
-        /// N.cm
         NewtonCentimetre = (Family::Torque, &["N.cm", "Ncm", "N·cm"], 1e-2),
-        /// N.mm
         NewtonMillimetre = (Family::Torque, &["N.mm", "Nmm", "N·mm"], 1e-3),
-        /// mN.m
         MillinewtonMetre = (Family::Torque, &["mN.m", "mNm", "mN·m"], 1e-3),
-        /// kN.m
         KilonewtonMetre = (Family::Torque, &["kN.m", "kNm", "kN·m"], 1e3),
-        /// lbf.in
         PoundInch = (Family::Torque, &["lbf.in", "in.lbf", "in-lb", "lb-in", "lbf-in"], POUND_FORCE_N * 0.0254),
-        /// lbf.ft
         PoundFoot = (Family::Torque, &["lbf.ft", "ft.lbf", "ft-lb", "lb-ft", "lbf-ft"], POUND_FORCE_N * 0.3048),
-        /// kgf.cm
         KilogramCentimetre = (Family::Torque, &["kgf.cm", "kg.cm"], KILOGRAM_FORCE_N * 1e-2),
-        /// kgf.m
         KilogramMetre = (Family::Torque, &["kgf.m", "kg.m"], KILOGRAM_FORCE_N),
-        /// ozf.in
         OunceInch = (Family::Torque, &["ozf.in", "oz.in", "oz-in"], POUND_FORCE_N / 16.0 * 0.0254),
         /// A: a current; its torque for an ampere has to be said.
         Ampere = (Family::Torque, &["A"], 1.0),
@@ -69,11 +48,8 @@ table! {
         Milliampere = (Family::Torque, &["mA"], 1.0),
         /// V of a transducer, likewise.
         Volt = (Family::Torque, &["V"], 1.0),
-        /// C
-        Celsius = (Family::Temperature, &["C", "°C", "degC"], 1.0),
-        /// K
-        Kelvin = (Family::Temperature, &["K"], 1.0),
-        /// F
+        Celsius = (Family::Temperature, &["C", "°C", "degC", "c"], 1.0),
+        Kelvin = (Family::Temperature, &["K", "k"], 1.0),
         Fahrenheit = (Family::Temperature, &["F", "°F", "degF"], 5.0 / 9.0),
     }
 }
@@ -110,14 +86,17 @@ impl Family {
     }
 }
 
-/// Units at the end of a name that are written otherwise there.
-const IN_NAMES: [(&str, Unit); 2] = [("_c", Unit::Celsius), ("_k", Unit::Kelvin)];
 /// Words at the end of a name that are more often something else: `torque_min`, `q_d`.
 const NOT_IN_NAMES: [&str; 6] = ["min", "h", "d", "F", "day", "iso"];
 
 impl Unit {
     /// Units of angle that one may take for another, the largest name first that a slip of the pen takes for another.
     pub(crate) const ANGLES: [Unit; 5] = [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond];
+
+    /// Units of a torque that have a size of their own.
+    pub(crate) fn of_a_torque() -> impl Iterator<Item = Unit> {
+        Family::Torque.units().filter(|unit| unit.needs_gain().is_none())
+    }
 
     /// Its name in a mapping.
     pub fn name(self) -> &'static str {
@@ -178,14 +157,11 @@ impl Unit {
         if let Some(text) = Unit::bracketed(column) {
             return Unit::written(text);
         }
-        if let Some((_, unit)) = IN_NAMES.iter().find(|(end, _)| column.ends_with(end)) {
-            return Some(*unit);
-        }
         // `torque_kgf_cm`, `torque_knm`, `load_Lb_In`: all that a torque's unit may lack in a name is dots and case.
         let plain = |text: &str| text.chars().filter(char::is_ascii_alphabetic).collect::<String>().to_lowercase();
         let words = column.match_indices('_').map(|(at, _)| plain(&column[at..]));
-        let torques = || Family::Torque.units().filter(|unit| unit.needs_gain().is_none());
-        let of_torque = |word: String| torques().find(|unit| unit.row().1.iter().any(|text| plain(text) == word));
+        let of_torque =
+            |word: String| Unit::of_a_torque().find(|unit| unit.row().1.iter().any(|text| plain(text) == word));
         let (_, word) = column.rsplit_once('_')?;
         let written = Unit::written(word).filter(|_| !NOT_IN_NAMES.contains(&word));
         written.or_else(|| words.filter_map(of_torque).last())

@@ -201,7 +201,9 @@ impl Effect {
                 Usual::OfLoad(share) => share * setting.load_n_m,
                 Usual::Drawn(low, high) => low + (high - low) * drawn,
                 Usual::Instant(low, high) => setting.instant(low + (high - low) * drawn),
-                Usual::ToothPitch => setting.tooth_pitch_arcsec()?,
+                Usual::ToothPitch => {
+                    ARCSEC_PER_TURN / f64::from(setting.nominal.teeth.ok_or_else(EffectError::no_teeth)?.of_output())
+                }
                 Usual::Follows => continue,
             };
             complete.values.insert(parameter.name, value);
@@ -260,10 +262,6 @@ impl<'a> Setting<'a> {
     fn teeth(&self, wheel: f64) -> Result<f64, EffectError> {
         let teeth = self.nominal.teeth.ok_or_else(EffectError::no_teeth)?;
         Ok(f64::from(if wheel == 0.0 { teeth.flexspline } else { teeth.circular_spline }))
-    }
-
-    fn tooth_pitch_arcsec(&self) -> Result<f64, EffectError> {
-        Ok(ARCSEC_PER_TURN / f64::from(self.nominal.teeth.ok_or_else(EffectError::no_teeth)?.of_output()))
     }
 
     fn factor(&self, factor: Factor, effect: &Effect) -> Result<f64, EffectError> {

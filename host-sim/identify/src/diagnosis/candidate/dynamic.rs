@@ -292,7 +292,7 @@ fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
     let plays = known.into_iter().chain(Some(on.base.law).filter(|law| !known.contains(law))).filter(|_| is_told);
     let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
     let on_sample = thinned.as_ref().map_or(*on, |thinned| on.over(&thinned.rows, &thinned.base));
-    plays.map(|play| gravity_torque(play, on, &on_sample).variant(play.as_str())).collect()
+    plays.map(|play| gravity_torque(play, on, &on_sample).variant(play.row())).collect()
 }
 
 /// Gravity turns an unbalanced load, which the torque column does not hold.

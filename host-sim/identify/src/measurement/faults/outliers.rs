@@ -107,11 +107,6 @@ fn in_sessions(log: &Log, channel: Quantity, least: f64) -> Vec<Out> {
     log.sessions().flat_map(of).collect()
 }
 
-/// Whether more rows are out than hide others.
-fn are_many(found: &[Out], log: &Log) -> bool {
-    found.len() as f64 > MANY * log.len() as f64
-}
-
 /// Rows that are out by more than `least`, and by far more than all around them but one of them.
 fn rows_out(values: &[f64], least: f64) -> Vec<Out> {
     let mut found = Vec::new();
@@ -180,9 +175,9 @@ fn of_error(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     }
     let late_by = late_by(generator, &found);
     report(log, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
-    let many = are_many(&found, log);
+    let hide_others = found.len() as f64 > MANY * log.len() as f64;
     log.leave_out(&marked(log.len(), moved.into_iter().chain(found).map(|(row, _)| row)));
-    if many {
+    if hide_others {
         let more: usize = (0..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(log, STEPS * resolution)).sum();
         if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
             fault.rows += more as u64;
