@@ -164,7 +164,7 @@ impl Unit {
             |word: String| Unit::of_a_torque().find(|unit| unit.row().1.iter().any(|text| plain(text) == word));
         let (_, word) = column.rsplit_once('_')?;
         let written = Unit::written(word).filter(|_| !NOT_IN_NAMES.contains(&word));
-        written.or_else(|| words.filter_map(of_torque).last())
+        written.or_else(|| words.filter_map(of_torque).next_back())
     }
 }
 
