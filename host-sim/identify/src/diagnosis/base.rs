@@ -168,7 +168,7 @@ const CLEARLY_BETTER: f64 = 0.995;
 const FAR_BETTER: f64 = 0.8;
 /// Share of its squares below which hardly anything of a column is its own. *Guess*: what is left where a drive turns.
 const HARDLY_OWN: f64 = 0.1;
-/// Spread of what stays as stated in these rows, and may not in others that a fit predicts.
+/// Spread of what stays as stated in these rows, and may not in others that a fit predicts: by definition none.
 pub(super) const HELD: f64 = f64::MIN_POSITIVE;
 /// Rows are uncertain where the torque is below this multiple of friction. *Guess*: friction of a unit is known to a
 /// quarter.
@@ -242,7 +242,7 @@ impl Base {
         // the rows say whether it does; they do not where the motion alone chooses the flank.
         let stated_n_m = nominal.friction_torque_n_m;
         // As far as friction takes a spring it may have another slope than where the load alone would.
-        let by_n_m = -nominal.ratio.signum() * if stated_n_m > 0.0 { stated_n_m } else { 0.5 };
+        let by_n_m = -nominal.ratio.signum() * if stated_n_m > 0.0 { stated_n_m } else { 1.0 };
         let winds = |torque: f64, way: &f64| {
             (nominal.wind_up_arcsec(torque + by_n_m * way) - nominal.wind_up_arcsec(torque)) / by_n_m.abs()
         };

@@ -54,7 +54,7 @@ table! {
     }
 }
 
-/// The kilogram-force, N: by the standard acceleration, 9.806 65 m/s².
+/// The kilogram-force, N: by definition, a kilogram times the standard acceleration, 9.806 65 m/s².
 const KILOGRAM_FORCE_N: f64 = 9.806_65;
 /// The pound-force, N: 0.453 592 37 kg (1959) times that.
 const POUND_FORCE_N: f64 = 4.448_221_615_260_5;

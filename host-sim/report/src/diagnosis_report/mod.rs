@@ -525,7 +525,7 @@ fn alike(cause: &Cause) -> Vec<String> {
     cause.look_alikes.iter().map(|name| name.words().to_owned()).chain(cause.outside_the_library()).collect()
 }
 
-/// A free parameter of the nominal model: the zero as an error, times in milliseconds, drag in N·m, the rest as a share.
+/// A free parameter of the nominal model: the zero as an error, times in milliseconds, drag in N·m, else a share.
 fn recalibrated_value(name: &str, p: Parameter) -> RichText {
     if name.starts_with("zero") {
         return RichText::arcsec(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
