@@ -184,7 +184,7 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
             Refused(&["angles in degrees", "--columns generator=generator_rad:deg,output=output_rad:deg"]),
         ),
         ("torque turned round", changed(|b| scaled(b.torque(), -1.0)), Faults(&["torque_sign"])),
-        ("torque of the motor", changed(|b| scaled(b.torque(), 1.0 / RATIO)), LeftOut("unit_mismatch")),
+        ("torque of the motor", changed(|b| scaled(b.torque(), 1.0 / RATIO)), Unusable("unit_mismatch")),
         ("torque whose zero is off", changed(|b| shifted(b.torque(), 0.8)), Faults(&["torque_zero"])),
         (
             "torque in steps of a twentieth of its range",

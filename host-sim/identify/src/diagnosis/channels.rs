@@ -689,7 +689,7 @@ mod tests {
         let nominal = catalogue_drive();
         let mut hundredths = recording(&nominal, |_, load| 100.0 * load);
         let said = check_torque(&mut hundredths, &nominal, None).unwrap();
-        let of_shaft = format!("if it is in N.m/{}: nothing says so", nominal.ratio.abs());
+        let of_shaft = format!(" if it is in N.m/{}, ", nominal.ratio.abs());
         assert!(
             said.contains("if it is in N.cm, ") && said.contains(&of_shaft) && said.contains("=NAME:N.cm,"),
             "{said}"

@@ -48,8 +48,8 @@ table! {
         Milliampere = (Family::Torque, &["mA"], 1.0),
         /// V of a transducer, likewise.
         Volt = (Family::Torque, &["V"], 1.0),
-        Celsius = (Family::Temperature, &["C", "°C", "degC", "c"], 1.0),
-        Kelvin = (Family::Temperature, &["K", "k"], 1.0),
+        Celsius = (Family::Temperature, &["C", "°C", "degC"], 1.0),
+        Kelvin = (Family::Temperature, &["K"], 1.0),
         Fahrenheit = (Family::Temperature, &["F", "°F", "degF"], 5.0 / 9.0),
     }
 }
@@ -163,7 +163,8 @@ impl Unit {
         let of_torque =
             |word: String| Unit::of_a_torque().find(|unit| unit.row().1.iter().any(|text| plain(text) == word));
         let (_, word) = column.rsplit_once('_')?;
-        let written = Unit::written(word).filter(|_| !NOT_IN_NAMES.contains(&word));
+        let capital = if ["c", "k"].contains(&word) { &word.to_uppercase() } else { word };
+        let written = Unit::written(capital).filter(|_| !NOT_IN_NAMES.contains(&word));
         written.or_else(|| words.filter_map(of_torque).next_back())
     }
 }

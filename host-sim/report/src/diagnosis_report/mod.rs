@@ -531,8 +531,7 @@ fn recalibrated_value(name: &str, p: Parameter) -> RichText {
         return RichText::arcsec(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
     }
     let words = if [BETWEEN_READINGS, CHANGE_OF_FLANK].contains(&name) {
-        let ms = |seconds: f64| significant(1e3 * seconds, 2);
-        format!("{}\u{a0}±\u{a0}{}\u{a0}ms", ms(p.value), ms(p.std))
+        format!("{}\u{a0}±\u{a0}{}\u{a0}ms", significant(1e3 * p.value, 2), significant(1e3 * p.std, 2))
     } else if name.starts_with("drag") {
         format!("{}\u{a0}±\u{a0}{}\u{a0}N·m", significant(p.value, 2), significant(p.std, 2))
     } else {
