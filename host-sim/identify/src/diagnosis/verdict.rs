@@ -563,6 +563,16 @@ mod tests {
     }
 
     #[test]
+    fn a_zero_that_moves_by_whole_pitches_may_be_teeth_that_skipped() {
+        let whole = |jump: f64, pitch: Option<f64>| {
+            let tooth_pitch_rad = pitch.map(|pitch| pitch / ARCSEC_PER_RAD);
+            let gear = crate::measurement::Gear { tooth_pitch_rad, ..crate::measurement::Gear::of_ratio(100.0) };
+            whole_pitches(jump / ARCSEC_PER_RAD, &gear, BESIDE_PITCHES, INTERVAL * 2.0 / ARCSEC_PER_RAD).is_some()
+        };
+        assert!([6416.0, -12_810.0].iter().all(|jump| whole(*jump, Some(6416.2))));
+        assert!(![0.4, 5900.0].iter().any(|jump| whole(*jump, Some(6416.2))) && !whole(300.0, None));
+    }
+    #[test]
     fn what_laws_leave_beyond_the_noise_widens_what_is_told_from_zero() {
         assert_eq!(beyond_noise(5.0, 4.5), 1.0);
         assert_eq!(beyond_noise(6.0, 4.0), 1.5);
